@@ -2,53 +2,53 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Draws the plots of a report with Plotly, and leads from times to frames and plots. */
 
-/**
- * @typedef {object} Line
- * @property {string} name
- * @property {string} colour name of a custom property
- * @property {string} dash
- * @property {string} x 32-bit floats in base64
- * @property {string} y 64-bit floats in base64
- *
- * @typedef {object} Plot
- * @property {string} unit
- * @property {boolean} plane
- * @property {[number, number]|null} bounds
- * @property {{value: number, label: string}[]} limits
- * @property {{from: number, to: number, label: string, colour: string}[]} spans
- * @property {Line[]} lines
- *
- * @typedef {HTMLElement & {
- *   on?: (event: string, listener: (change: Record<string, unknown>) => void) => void,
- *   layout?: {xaxis?: {autorange?: boolean, range?: [number, number]}},
- * }} PlotNode
- */
+export interface Line {
+  name: string;
+  colour: string; // name of a custom property
+  dash: string;
+  x: string; // 32-bit floats in base64
+  y: string; // 64-bit floats in base64
+}
+
+export interface Plot {
+  unit: string;
+  plane: boolean;
+  bounds: [number, number] | null;
+  limits: { value: number; label: string }[];
+  spans: { from: number; to: number; label: string; colour: string }[];
+  lines: Line[];
+}
+
+export interface PlotNode extends HTMLElement {
+  on?: (event: string, listener: (change: Record<string, unknown>) => void) => void;
+  layout?: { xaxis?: { autorange?: boolean; range?: [number, number] } };
+}
+
+export type Draw = (node: HTMLElement, ...what: object[]) => Promise<unknown>;
 
 (() => {
-  const { Plotly } = /** @type {{Plotly: any}} */ (/** @type {unknown} */ (window));
+  const { Plotly } = window as unknown as { Plotly: Record<'react' | 'relayout', Draw> };
   // Of a plot on paper, two of them beside each other [CSS px].
   const PAPER = { width: 336, height: 196 };
   const PAPER_PLANE = { width: 690, height: 340 };
   const CONFIG = { displaylogo: false, displayModeBar: false, responsive: false };
 
-  /** @type {Record<string, Plot>} */
-  const plots = JSON.parse(document.getElementById('plots')?.textContent ?? '{}');
-  /** @type {Map<string, {x: Float32Array, y: Float64Array}[]>} */
-  const decoded = new Map();
-  /** @type {Map<PlotNode, {paper: boolean}>} */
-  const drawn = new Map();
-  /** The chosen time of each run [s]. @type {Map<string, number>} */
-  const chosen = new Map();
-  const nodes = /** @type {PlotNode[]} */ ([...document.querySelectorAll('.plot')]);
+  const plots: Record<string, Plot> = JSON.parse(
+    document.getElementById('plots')?.textContent ?? '{}');
+  const decoded = new Map<string, { x: Float32Array; y: Float64Array }[]>();
+  const drawn = new Map<PlotNode, { paper: boolean }>();
+  /** The chosen time of each run [s]. */
+  const chosen = new Map<string, number>();
+  const nodes = [...document.querySelectorAll<PlotNode>('.plot')];
   let printing = false;
 
-  /** @param {string} text base64 */
-  function bytes(text) {
+  /** @param text base64 */
+  function bytes(text: string) {
     return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
   }
 
-  /** @param {string} name of a colour */
-  function colour(name) {
+  /** @param name of a colour */
+  function colour(name: string) {
     return theme.getPropertyValue(`--${name}`).trim();
   }
 
@@ -57,20 +57,17 @@
   probe.hidden = true;
   document.body.append(probe);
   const theme = {
-    /** @param {string} name */
-    getPropertyValue(name) {
+    getPropertyValue(name: string) {
       probe.style.color = `var(${name})`;
       return getComputedStyle(probe).color;
     },
   };
 
-  /** @param {PlotNode} node */
-  function runOf(node) {
+  function runOf(node: PlotNode) {
     return node.id.split('-', 1)[0];
   }
 
-  /** @param {PlotNode} node */
-  function values(node) {
+  function values(node: PlotNode) {
     const known = decoded.get(node.id);
     if (known !== undefined) {
       return known;
@@ -82,8 +79,7 @@
     return found;
   }
 
-  /** @param {PlotNode} node */
-  function traces(node) {
+  function traces(node: PlotNode) {
     const found = values(node);
     return plots[node.id].lines.map((line, i) => ({
       type: 'scatter', mode: 'lines', name: line.name, x: found[i].x, y: found[i].y,
@@ -96,8 +92,7 @@
     }));
   }
 
-  /** @param {PlotNode} node */
-  function shapes(node) {
+  function shapes(node: PlotNode) {
     const plot = plots[node.id];
     const time = chosen.get(runOf(node));
     const lines = plot.limits.map((limit) => ({
@@ -123,11 +118,7 @@
     return [...spans, ...lines, ...cursor];
   }
 
-  /**
-   * @param {PlotNode} node
-   * @param {boolean} paper
-   */
-  function layout(node, paper) {
+  function layout(node: PlotNode, paper: boolean) {
     const plot = plots[node.id];
     const size = paper ? (plot.plane ? PAPER_PLANE : PAPER)
       : { width: node.clientWidth, height: node.clientHeight };
@@ -160,8 +151,7 @@
     };
   }
 
-  /** @param {PlotNode} node */
-  function draw(node) {
+  function draw(node: PlotNode) {
     const first = !drawn.has(node);
     drawn.set(node, { paper: printing });
     Plotly.react(node, traces(node), layout(node, printing),
@@ -172,13 +162,8 @@
     }
   }
 
-  /**
-   * Show the same time in all plots of a run.
-   *
-   * @param {PlotNode} node
-   * @param {Record<string, unknown>} change
-   */
-  function follow(node, change) {
+  /** Show the same time in all plots of a run. */
+  function follow(node: PlotNode, change: Record<string, unknown>) {
     const whole = change['xaxis.autorange'] === true;
     const from = change['xaxis.range[0]'];
     const to = change['xaxis.range[1]'];
@@ -199,10 +184,9 @@
   /**
    * Mark a time in all plots of its run.
    *
-   * @param {string} run
-   * @param {number} time [s]
+   * @param time [s]
    */
-  function choose(run, time) {
+  function choose(run: string, time: number) {
     chosen.set(run, time);
     for (const node of drawn.keys()) {
       if (runOf(node) === run && !plots[node.id].plane) {
@@ -211,14 +195,9 @@
     }
   }
 
-  /**
-   * A click into a plot marks its time, and the frame next to it.
-   *
-   * @param {PlotNode} node
-   * @param {Record<string, unknown>} change
-   */
-  function pick(node, change) {
-    const [point] = /** @type {{x: number}[]} */ (change.points ?? []);
+  /** A click into a plot marks its time, and the frame next to it. */
+  function pick(node: PlotNode, change: Record<string, unknown>) {
+    const [point] = (change.points ?? []) as { x: number }[];
     if (point === undefined || plots[node.id].plane) {
       return;
     }
@@ -234,16 +213,14 @@
     best?.frame.classList.add('shown');
   }
 
-  /** @param {string} run */
-  function frames(run) {
-    return /** @type {HTMLElement[]} */ (
-      [...document.querySelectorAll(`.frame[id^="${run}-"]`)]);
+  function frames(run: string) {
+    return [...document.querySelectorAll(`.frame[id^="${run}-"]`)] as HTMLElement[];
   }
 
   /** A time that leads to its frame is marked in the plots, too. */
   document.addEventListener('click', (event) => {
     const target = event.target instanceof Element ? event.target : null;
-    const link = /** @type {HTMLElement|null} */ (target?.closest('a[data-time], .frame') ?? null);
+    const link = (target?.closest('a[data-time], .frame') ?? null) as HTMLElement | null;
     if (link === null) {
       return;
     }
@@ -264,7 +241,7 @@
   // Hidden plots are not drawn.
   const observer = new IntersectionObserver((entries) => {
     for (const entry of entries) {
-      const node = /** @type {PlotNode} */ (entry.target);
+      const node = entry.target as PlotNode;
       if (entry.isIntersecting && !drawn.has(node)) {
         observer.unobserve(node);
         draw(node);

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The WebSocket to the cockpit's server, which reconnects by itself and feeds the store. */
 
-/** @import { PageMessage, Reply, RequestMessage, ServerMessage } from './messages.js' */
-/** @import { Store } from './store.js' */
+import type { PageMessage, Reply, RequestMessage, ServerMessage } from './messages.js';
+import type { Store } from './store.js';
 
 const FIRST_RETRY_MS = 250;
 const LAST_RETRY_MS = 2000;
@@ -15,10 +15,8 @@ const LONGEST_TOLD_MS = 60000;
 export class Connection {
   #store;
   #url;
-  /** @type {WebSocket|null} */
-  #socket = null;
-  /** @type {Map<number, {resolve: (reply: Reply) => void, timer: number}>} */
-  #pending = new Map();
+  #socket: WebSocket | null = null;
+  #pending = new Map<number, { resolve: (reply: Reply) => void; timer: number }>();
   #lastId = 0;
   #retry_ms = FIRST_RETRY_MS;
   #retryTimer = 0;
@@ -26,10 +24,10 @@ export class Connection {
   #closed = false;
 
   /**
-   * @param {Store} store told everything that arrives
-   * @param {string} [url] of the WebSocket; that of this page's server by default
+   * @param store told everything that arrives
+   * @param url of the WebSocket; that of this page's server by default
    */
-  constructor(store, url = socketUrl(window.location)) {
+  constructor(store: Store, url = socketUrl(window.location)) {
     this.#store = store;
     this.#url = url;
     this.#open();
@@ -45,10 +43,10 @@ export class Connection {
   /**
    * Send a message that needs no answer.
    *
-   * @param {PageMessage} message with its `type`
-   * @returns {boolean} false when there is no connection
+   * @param message with its `type`
+   * @returns false when there is no connection
    */
-  send(message) {
+  send(message: PageMessage): boolean {
     if (!this.open) {
       return false;
     }
@@ -59,10 +57,10 @@ export class Connection {
   /**
    * Send a message and wait for the server's reply.
    *
-   * @param {RequestMessage} message with its `type`; gets its `id` here
-   * @returns {Promise<Reply>} never rejects
+   * @param message with its `type`; gets its `id` here
+   * @returns never rejects
    */
-  request(message) {
+  request(message: RequestMessage): Promise<Reply> {
     this.#lastId += 1;
     const id = this.#lastId;
     if (!this.send({ ...message, id })) {
@@ -120,14 +118,12 @@ export class Connection {
     }
   }
 
-  /** @param {ArrayBuffer|string} data */
-  #receive(data) {
+  #receive(data: ArrayBuffer | string) {
     if (data instanceof ArrayBuffer) {
       this.#store.receiveFrame(data, performance.now());
       return;
     }
-    /** @type {ServerMessage} */
-    const message = JSON.parse(data);
+    const message: ServerMessage = JSON.parse(data);
     if (message.type === 'reply') {
       this.#settle(message.to, message);
     } else if (message.type === 'pong') {
@@ -137,11 +133,7 @@ export class Connection {
     }
   }
 
-  /**
-   * @param {number} id
-   * @param {Reply} reply
-   */
-  #settle(id, reply) {
+  #settle(id: number, reply: Reply) {
     const waiting = this.#pending.get(id);
     if (waiting !== undefined) {
       this.#pending.delete(id);
@@ -154,9 +146,9 @@ export class Connection {
 /**
  * Return the socket's address beside a page's: a replay has an address below the cockpit's.
  *
- * @param {Location} location of the page
+ * @param location of the page
  */
-function socketUrl(location) {
+function socketUrl(location: Location) {
   const url = new URL('ws', location.href);
   url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
   return url.href;

@@ -4,29 +4,28 @@
 
 import { countWhile } from './search.js';
 
-/** @import { CriticalityFrame } from './frames.js' */
-/** @import { Measure, Status } from './messages.js' */
+import type { CriticalityFrame } from './frames.js';
+import type { Measure, Status } from './messages.js';
 
-/** @typedef {{value: number, of: number}} Critical a value, and the column of the other object */
-/** @typedef {Critical & {t: number}} Worst */
-/** @typedef {Record<string, number>} Limits by measure */
+/** A value, and the column of the other object. */
+export interface Critical { value: number; of: number }
+export interface Worst extends Critical { t: number }
+export type Limits = Record<string, number>; // by measure
 
 /** The most critical values of each vehicle over time. */
 export class CriticalityLog {
-  /** @type {CriticalityFrame[]} */
-  #frames = [];
+  #frames: CriticalityFrame[] = [];
   #keeps_s;
-  /** @type {(() => void)|null} */
-  #fetch;
+  #fetch: (() => void) | null;
 
   #measures;
 
   /**
-   * @param {() => Measure[]} measures returns those of each frame, in order
-   * @param {number} keeps_s how far back [s]
-   * @param {(() => void)|null} [fetch] requests the frames; null if they arrive by themselves
+   * @param measures returns those of each frame, in order
+   * @param keeps_s how far back [s]
+   * @param fetch requests the frames; null if they arrive by themselves
    */
-  constructor(measures, keeps_s, fetch = null) {
+  constructor(measures: () => Measure[], keeps_s: number, fetch: (() => void) | null = null) {
     this.#measures = measures;
     this.#keeps_s = keeps_s;
     this.#fetch = fetch;
@@ -49,12 +48,8 @@ export class CriticalityLog {
     return this.#frames.length;
   }
 
-  /**
-   * Add the values of a step; a repeated step replaces the stored one.
-   *
-   * @param {CriticalityFrame} frame
-   */
-  add(frame) {
+  /** Add the values of a step; a repeated step replaces the stored one. */
+  add(frame: CriticalityFrame) {
     while ((this.#frames.at(-1)?.n ?? -1) >= frame.n) {
       this.#frames.pop();
     }
@@ -67,11 +62,10 @@ export class CriticalityLog {
   /**
    * Return a vehicle's values over time.
    *
-   * @param {number} index of the vehicle
-   * @param {string} name
-   * @returns {{t: number[], values: number[]}} NaN where nothing is near
+   * @param index of the vehicle
+   * @returns NaN where nothing is near
    */
-  past(index, name) {
+  past(index: number, name: string): { t: number[]; values: number[] } {
     return {
       t: this.#frames.map((frame) => frame.t),
       values: this.#frames.map((frame) => this.#critical(frame, index, name)?.value ?? NaN),
@@ -81,12 +75,11 @@ export class CriticalityLog {
   /**
    * Return a measure of a vehicle at a time.
    *
-   * @param {number} t [s]
-   * @param {number} index of the vehicle
-   * @param {string} name
-   * @returns {Critical|null} null if nothing is near, or no measurement is recent
+   * @param t [s]
+   * @param index of the vehicle
+   * @returns null if nothing is near, or no measurement is recent
    */
-  at(t, index, name) {
+  at(t: number, index: number, name: string): Critical | null {
     const count = countWhile(this.#frames.length, (i) => this.#frames[i].t <= t + 1e-9);
     const frame = this.#frames[count - 1];
     return frame === undefined || t - frame.t > 1 ? null : this.#critical(frame, index, name);
@@ -95,15 +88,13 @@ export class CriticalityLog {
   /**
    * Return the most critical value until a time.
    *
-   * @param {number} t [s]
-   * @param {number} index of the vehicle
-   * @param {string} name
-   * @returns {Worst|null} null where there was none
+   * @param t [s]
+   * @param index of the vehicle
+   * @returns null where there was none
    */
-  worst(t, index, name) {
+  worst(t: number, index: number, name: string): Worst | null {
     const sense = this.#measures().find((each) => each.name === name)?.worst ?? -1;
-    /** @type {Worst|null} */
-    let worst = null;
+    let worst: Worst | null = null;
     for (const frame of this.#frames) {
       const found = frame.t <= t + 1e-9 ? this.#critical(frame, index, name) : null;
       if (found !== null && (worst === null || sense * (found.value - worst.value) > 0)) {
@@ -113,13 +104,8 @@ export class CriticalityLog {
     return worst;
   }
 
-  /**
-   * @param {CriticalityFrame} frame
-   * @param {number} index of the vehicle
-   * @param {string} name
-   * @returns {Critical|null}
-   */
-  #critical({ rows, width }, index, name) {
+  /** @param index of the vehicle */
+  #critical({ rows, width }: CriticalityFrame, index: number, name: string): Critical | null {
     const place = this.#measures().findIndex((each) => each.name === name);
     for (let row = 0; row < rows.length; row += width) {
       if (place >= 0 && rows[row] === index) {
@@ -133,14 +119,12 @@ export class CriticalityLog {
 }
 
 /**
- * @param {Measure[]} measures
- * @param {Status|null} status of a live run, which may have other limits
- * @returns {Limits} beyond which values are critical
+ * @param status of a live run, which may have other limits
+ * @returns beyond which values are critical
  */
-export function limitsOf(measures, status) {
+export function limitsOf(measures: Measure[], status: Status | null): Limits {
   const [told] = Object.values(status?.criticality ?? {});
-  /** @type {Limits} */
-  const limits = {};
+  const limits: Limits = {};
   for (const { name, limit } of measures) {
     if (limit !== null) {
       limits[name] = told?.thresholds[name] ?? limit;
@@ -149,13 +133,9 @@ export function limitsOf(measures, status) {
   return limits;
 }
 
-/**
- * @param {Measure} measure
- * @param {Limits} limits
- * @param {number|undefined} value
- * @returns {boolean} also where the two touch
- */
-export function isCritical({ name, worst }, limits, value) {
+/** @returns also where the two touch */
+export function isCritical({ name, worst }: Measure, limits: Limits,
+  value: number | undefined): boolean {
   if (value === undefined || !(name in limits)) {
     return false;
   }

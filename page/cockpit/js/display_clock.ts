@@ -49,10 +49,10 @@ export class DisplayClock {
   /**
    * Record the arrival of a sample.
    *
-   * @param {number} t its simulation time [s]
-   * @param {number} now_ms when it arrived
+   * @param t its simulation time [s]
+   * @param now_ms when it arrived
    */
-  arrived(t, now_ms) {
+  arrived(t: number, now_ms: number) {
     const last = (this.#next + WINDOW - 1) % WINDOW;
     if (this.#count > 0 && (now_ms - this.#at[last] > SILENCE_MS || t <= this.#t[last])) {
       this.#count = 0;
@@ -68,12 +68,12 @@ export class DisplayClock {
   /**
    * Return the simulation time to show.
    *
-   * @param {number} now_ms wall time of the frame, which never goes back
-   * @param {number} newest_t of the newest sample [s]
-   * @param {boolean} runs false while the simulation stands still
-   * @returns {number} simulation time [s]
+   * @param now_ms wall time of the frame, which never goes back
+   * @param newest_t of the newest sample [s]
+   * @param runs false while the simulation stands still
+   * @returns simulation time [s]
    */
-  time(now_ms, newest_t, runs) {
+  time(now_ms: number, newest_t: number, runs: boolean): number {
     if (!runs || this.#count === 0) {
       this.#shown = newest_t;
     } else {

@@ -4,53 +4,37 @@
 
 const SVG = 'http://www.w3.org/2000/svg';
 
-/**
- * @typedef {{[Name in keyof HTMLElementEventMap]?: (event: HTMLElementEventMap[Name]) => void}
- *   } Listeners
- * @typedef {{text?: string, on?: Listeners}
- *   & {[name: string]: string|number|boolean|null|undefined|Listeners}} Attributes
- */
+export type Listeners = {
+  [Name in keyof HTMLElementEventMap]?: (event: HTMLElementEventMap[Name]) => void
+};
+export type Attributes = { text?: string; on?: Listeners }
+  & { [name: string]: string | number | boolean | null | undefined | Listeners };
 
 /**
  * Make an HTML element.
  *
- * @template {keyof HTMLElementTagNameMap} Tag
- * @param {Tag} tag name of the element.
- * @param {Attributes} [attributes] `class`, `text`, `on` (listeners by event name) and
- *   attributes; true gives an empty attribute, false, null and undefined none.
- * @param {...(Node|string|null)} children
- * @returns {HTMLElementTagNameMap[Tag]}
+ * @param tag name of the element.
+ * @param attributes `class`, `text`, `on` (listeners by event name) and attributes; true gives an
+ *   empty attribute, false, null and undefined none.
  */
-export function element(tag, attributes = {}, ...children) {
+export function element<Tag extends keyof HTMLElementTagNameMap>(tag: Tag,
+  attributes: Attributes = {}, ...children: (Node | string | null)[]): HTMLElementTagNameMap[Tag] {
   return fill(document.createElement(tag), attributes, children);
 }
 
-/**
- * Make an SVG element; the parameters are those of `element`.
- *
- * @template {keyof SVGElementTagNameMap} Tag
- * @param {Tag} tag
- * @param {Attributes} [attributes]
- * @param {...(Node|string|null)} children
- * @returns {SVGElementTagNameMap[Tag]}
- */
-export function svg(tag, attributes = {}, ...children) {
+/** Make an SVG element; the parameters are those of `element`. */
+export function svg<Tag extends keyof SVGElementTagNameMap>(tag: Tag, attributes: Attributes = {},
+  ...children: (Node | string | null)[]): SVGElementTagNameMap[Tag] {
   return fill(document.createElementNS(SVG, tag), attributes, children);
 }
 
-/**
- * @template {Element} Filled
- * @param {Filled} node
- * @param {Attributes} attributes
- * @param {(Node|string|null)[]} children
- * @returns {Filled}
- */
-function fill(node, { text, on, ...attributes }, children) {
+function fill<Filled extends Element>(node: Filled, { text, on, ...attributes }: Attributes,
+  children: (Node | string | null)[]): Filled {
   if (text !== undefined) {
     node.textContent = text;
   }
   for (const [event, listener] of Object.entries(on ?? {})) {
-    node.addEventListener(event, /** @type {EventListener} */ (listener));
+    node.addEventListener(event, listener as EventListener);
   }
   for (const [name, value] of Object.entries(attributes)) {
     if (value !== false && value !== null && value !== undefined) {
@@ -64,14 +48,10 @@ function fill(node, { text, on, ...attributes }, children) {
 /**
  * Find the element with an id in, or at, a root.
  *
- * @param {HTMLElement} root
- * @param {string} id
- * @returns {HTMLElement}
  * @throws {Error} if the page has none.
  */
-export function part(root, id) {
-  /** @type {HTMLElement|null} */
-  const found = root.id === id ? root
+export function part(root: HTMLElement, id: string): HTMLElement {
+  const found: HTMLElement | null = root.id === id ? root
     : root.querySelector(`#${id}`) ?? document.getElementById(id);
   if (!found) {
     throw new Error(`the page has no element #${id}`);
@@ -79,13 +59,8 @@ export function part(root, id) {
   return found;
 }
 
-/**
- * Write text only when it changed, because every write costs a layout.
- *
- * @param {Element} node
- * @param {string} text
- */
-export function setText(node, text) {
+/** Write text only when it changed, because every write costs a layout. */
+export function setText(node: Element, text: string) {
   if (node.textContent !== text) {
     node.textContent = text;
   }
@@ -94,11 +69,9 @@ export function setText(node, text) {
 /**
  * Set or remove an attribute only when it changed.
  *
- * @param {Element} node
- * @param {string} name
- * @param {string|boolean|null} value true gives an empty attribute, false and null remove it.
+ * @param value true gives an empty attribute, false and null remove it.
  */
-export function setAttribute(node, name, value) {
+export function setAttribute(node: Element, name: string, value: string | boolean | null) {
   const text = value === true ? '' : value === false ? null : value;
   if (node.getAttribute(name) === text) {
     return;

@@ -22,86 +22,100 @@ export const PLAN_WIDTH = 5;
 
 const HEADER = 5;
 
-/**
- * @typedef {object} Head
- * @property {number} epoch counts resets
- * @property {number} n simulation step
- * @property {number} k scenario step
- * @property {number} t simulation time [s]
- */
+export interface Head {
+  epoch: number; // counts resets
+  n: number; // simulation step
+  k: number; // scenario step
+  t: number; // simulation time [s]
+}
 
-/**
- * Rows are flat; an index is that of a vehicle, a column counts vehicles, then objects.
- *
- * @typedef {Head & {kind: typeof KIND.STATE, vehicles: Float64Array}} StateFrame
- * @typedef {Head & {kind: typeof KIND.OBJECTS, objects: Float64Array}} ObjectsFrame
- * @typedef {Head & {kind: typeof KIND.PLAN, index: number, points: Float64Array}} PlanFrame
- * @typedef {{column: number, points: Float64Array}} PredictionEntry
- * @typedef {Head & {kind: typeof KIND.PREDICTION, index: number, steps: number,
- *   entries: PredictionEntry[]}} PredictionFrame
- * @typedef {Head & {kind: typeof KIND.SEEN, index: number, columns: Float64Array}} SeenFrame
- * @typedef {Head & {kind: typeof KIND.SCAN} & Scan} ScanFrame
- * @typedef {Head & {kind: typeof KIND.ESTIMATE} & Estimate} EstimateFrame
- * @typedef {Head & {kind: typeof KIND.OCCUPANCY} & Occupancy} OccupancyFrame
- * @typedef {Head & {kind: typeof KIND.CRITICALITY, width: number,
- *   rows: Float64Array}} CriticalityFrame
- * @typedef {ScanFrame|EstimateFrame|SeenFrame|OccupancyFrame} PerceptionFrame
- * @typedef {StateFrame|ObjectsFrame|PlanFrame|PredictionFrame|PerceptionFrame|
- *   CriticalityFrame} Frame
- */
+// Rows are flat; an index is that of a vehicle, a column counts vehicles, then objects.
+export interface StateFrame extends Head { kind: typeof KIND.STATE; vehicles: Float64Array }
+export interface ObjectsFrame extends Head { kind: typeof KIND.OBJECTS; objects: Float64Array }
 
-/**
- * @typedef {object} Scan
- * @property {number} index
- * @property {number} sensor
- * @property {number} x of the sensor at the time of the scan [m]
- * @property {number} y [m]
- * @property {number} yaw [rad]
- * @property {number} first angle of the first ray [rad]
- * @property {number} increment from ray to ray [rad]
- * @property {number} longest horizon [m]
- * @property {number} period_s
- * @property {Float64Array} ranges [m]
- */
+export interface PlanFrame extends Head {
+  kind: typeof KIND.PLAN;
+  index: number;
+  points: Float64Array;
+}
 
-/**
- * @typedef {object} Estimate
- * @property {number} index
- * @property {number} x of the rear axle [m]
- * @property {number} y [m]
- * @property {number} yaw [rad]
- * @property {number} speed [m/s]
- * @property {number} yaw_rate [rad/s]
- * @property {number} xx covariance [m^2]
- * @property {number} xy
- * @property {number} yy
- */
+export interface PredictionEntry { column: number; points: Float64Array }
 
-/**
- * @typedef {object} Occupancy
- * @property {number} x of the lower left corner [m]
- * @property {number} y [m]
- * @property {number} resolution [m]
- * @property {number} rows
- * @property {number} columns
- * @property {Uint8Array} bits one for each cell, row by row
- */
+export interface PredictionFrame extends Head {
+  kind: typeof KIND.PREDICTION;
+  index: number;
+  steps: number;
+  entries: PredictionEntry[];
+}
 
-/** @typedef {(from: number, count: number, width: number) => Float64Array} ReadRows */
+export interface SeenFrame extends Head {
+  kind: typeof KIND.SEEN;
+  index: number;
+  columns: Float64Array;
+}
+
+export interface ScanFrame extends Head, Scan { kind: typeof KIND.SCAN }
+export interface EstimateFrame extends Head, Estimate { kind: typeof KIND.ESTIMATE }
+export interface OccupancyFrame extends Head, Occupancy { kind: typeof KIND.OCCUPANCY }
+
+export interface CriticalityFrame extends Head {
+  kind: typeof KIND.CRITICALITY;
+  width: number;
+  rows: Float64Array;
+}
+
+export type PerceptionFrame = ScanFrame | EstimateFrame | SeenFrame | OccupancyFrame;
+export type Frame = StateFrame | ObjectsFrame | PlanFrame | PredictionFrame | PerceptionFrame
+  | CriticalityFrame;
+
+export interface Scan {
+  index: number;
+  sensor: number;
+  x: number; // of the sensor at the time of the scan [m]
+  y: number; // [m]
+  yaw: number; // [rad]
+  first: number; // angle of the first ray [rad]
+  increment: number; // from ray to ray [rad]
+  longest: number; // horizon [m]
+  period_s: number;
+  ranges: Float64Array; // [m]
+}
+
+export interface Estimate {
+  index: number;
+  x: number; // of the rear axle [m]
+  y: number; // [m]
+  yaw: number; // [rad]
+  speed: number; // [m/s]
+  yaw_rate: number; // [rad/s]
+  xx: number; // covariance [m^2]
+  xy: number;
+  yy: number;
+}
+
+export interface Occupancy {
+  x: number; // of the lower left corner [m]
+  y: number; // [m]
+  resolution: number; // [m]
+  rows: number;
+  columns: number;
+  bits: Uint8Array; // one for each cell, row by row
+}
+
+export type ReadRows = (from: number, count: number, width: number) => Float64Array;
 
 /**
  * Read one frame without copying its values.
  *
- * @param {ArrayBuffer} buffer the frame
- * @returns {Frame|null} null for an unknown kind
+ * @param buffer the frame
+ * @returns null for an unknown kind
  * @throws {RangeError} if the frame is shorter than its header says
  */
-export function decodeFrame(buffer) {
+export function decodeFrame(buffer: ArrayBuffer): Frame | null {
   const values = new Float64Array(buffer);
   const kind = values[0];
   const head = { epoch: values[1], n: values[2], k: values[3], t: values[4] };
-  /** @type {ReadRows} */
-  const rows = (from, count, width) => {
+  const rows: ReadRows = (from, count, width) => {
     if (!(count >= 0) || values.length < from + count * width) {
       throw new RangeError(`frame of kind ${kind} ends after ${values.length} values`);
     }
@@ -141,12 +155,7 @@ export function decodeFrame(buffer) {
   }
 }
 
-/**
- * @param {Float64Array} values
- * @param {ReadRows} rows
- * @returns {Scan}
- */
-function scan(values, rows) {
+function scan(values: Float64Array, rows: ReadRows): Scan {
   const [index, sensor, x, y, yaw, first, increment, longest, period_s] = rows(HEADER, 1, 9);
   return {
     index, sensor, x, y, yaw, first, increment, longest, period_s,
@@ -154,12 +163,7 @@ function scan(values, rows) {
   };
 }
 
-/**
- * @param {ArrayBuffer} buffer
- * @param {ReadRows} rows
- * @returns {Occupancy}
- */
-function occupancy(buffer, rows) {
+function occupancy(buffer: ArrayBuffer, rows: ReadRows): Occupancy {
   const [x, y, resolution, height, width] = rows(HEADER, 1, 5);
   const words = Math.ceil(height * width / 64);
   rows(HEADER + 5, words, 1);
@@ -169,12 +173,8 @@ function occupancy(buffer, rows) {
   };
 }
 
-/**
- * @param {Float64Array} values
- * @param {ReadRows} rows
- * @returns {{steps: number, entries: PredictionEntry[]}}
- */
-function predictions(values, rows) {
+function predictions(values: Float64Array,
+  rows: ReadRows): { steps: number; entries: PredictionEntry[] } {
   const steps = values[HEADER + 1];
   const entries = [];
   let at = HEADER + 3;

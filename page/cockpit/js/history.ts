@@ -4,28 +4,26 @@
 
 import { VEHICLE, VEHICLE_WIDTH } from './frames.js';
 
-/**
- * Arrays of the same length: t [s] and each column of VEHICLE.
- *
- * @typedef {Record<keyof typeof VEHICLE|'t', number[]>} History
- */
+/** Arrays of the same length: t [s] and each column of VEHICLE. */
+export type History = Record<keyof typeof VEHICLE | 't', number[]>;
 
-const COLUMNS = /** @type {[keyof typeof VEHICLE, number][]} */ (Object.entries(VEHICLE));
+const COLUMNS = Object.entries(VEHICLE) as [keyof typeof VEHICLE, number][];
 
-/** @returns {History} without a sample */
-export function emptyHistory() {
+/** @returns without a sample */
+export function emptyHistory(): History {
   const columns = COLUMNS.map(([name]) => [name, []]);
-  return /** @type {History} */ (Object.fromEntries([['t', []], ...columns]));
+  return Object.fromEntries([['t', []], ...columns]) as History;
 }
 
 /**
  * Add a vehicle's values of a sample.
  *
- * @param {History} past to which they are appended
- * @param {{t: number, vehicles: Float64Array}} sample rows of all vehicles
- * @param {number} index of the vehicle
+ * @param past to which they are appended
+ * @param sample rows of all vehicles
+ * @param index of the vehicle
  */
-export function addToHistory(past, { t, vehicles }, index) {
+export function addToHistory(past: History, { t, vehicles }: { t: number; vehicles: Float64Array },
+  index: number) {
   past.t.push(t);
   for (const [name, column] of COLUMNS) {
     past[name].push(vehicles[index * VEHICLE_WIDTH + column]);

@@ -9,12 +9,12 @@ const TURN = 2 * Math.PI;
 /**
  * Interpolate from one angle to another by the shortest way.
  *
- * @param {number} from [rad]
- * @param {number} to [rad]
- * @param {number} share 0 gives `from`, 1 the direction of `to`
- * @returns {number} angle [rad]
+ * @param from [rad]
+ * @param to [rad]
+ * @param share 0 gives `from`, 1 the direction of `to`
+ * @returns angle [rad]
  */
-export function turn(from, to, share) {
+export function turn(from: number, to: number, share: number): number {
   const difference = to - from;
   return from + share * (difference - TURN * Math.round(difference / TURN));
 }
@@ -22,12 +22,13 @@ export function turn(from, to, share) {
 /**
  * Interpolate all vehicles linearly between two samples.
  *
- * @param {Float64Array} out rows of VEHICLE_WIDTH, written
- * @param {Float64Array} before the sample at or before the time
- * @param {Float64Array} after the sample after it
- * @param {number} share of the way, 0 to 1
+ * @param out rows of VEHICLE_WIDTH, written
+ * @param before the sample at or before the time
+ * @param after the sample after it
+ * @param share of the way, 0 to 1
  */
-export function interpolateVehicles(out, before, after, share) {
+export function interpolateVehicles(out: Float64Array, before: Float64Array, after: Float64Array,
+  share: number) {
   for (let i = 0; i < out.length; i += 1) {
     const column = i % VEHICLE_WIDTH;
     if (column === VEHICLE.yaw) {
@@ -44,11 +45,11 @@ export function interpolateVehicles(out, before, after, share) {
 /**
  * Extrapolate all vehicles from a sample with their speeds and yaw rates.
  *
- * @param {Float64Array} out rows of VEHICLE_WIDTH, written
- * @param {Float64Array} sample the newest rows
- * @param {number} dt since the sample [s]
+ * @param out rows of VEHICLE_WIDTH, written
+ * @param sample the newest rows
+ * @param dt since the sample [s]
  */
-export function extrapolateVehicles(out, sample, dt) {
+export function extrapolateVehicles(out: Float64Array, sample: Float64Array, dt: number) {
   out.set(sample);
   for (let row = 0; row < out.length; row += VEHICLE_WIDTH) {
     const turned = sample[row + VEHICLE.yaw_rate] * dt;
@@ -62,11 +63,11 @@ export function extrapolateVehicles(out, sample, dt) {
 /**
  * Extrapolate all objects from their scenario step: pose + velocity * dt, velocities unchanged.
  *
- * @param {Float64Array} out rows of OBJECT_WIDTH, written
- * @param {Float64Array} sample rows at the step
- * @param {number} dt since the step [s]
+ * @param out rows of OBJECT_WIDTH, written
+ * @param sample rows at the step
+ * @param dt since the step [s]
  */
-export function moveObjects(out, sample, dt) {
+export function moveObjects(out: Float64Array, sample: Float64Array, dt: number) {
   for (let row = 0; row < out.length; row += OBJECT_WIDTH) {
     for (let column = 0; column < 3; column += 1) {
       out[row + column] = sample[row + column] + dt * sample[row + column + 3];

@@ -6,9 +6,9 @@
 export const LIGHT = Object.freeze({ left: 1, right: 2, horn: 4, brake: 8, blue: 16 });
 
 /** The buttons of an input message's `lights`, in its order. */
-export const LIGHT_BUTTONS = /** @type {const} */ ([
+export const LIGHT_BUTTONS = [
   'left_indicator', 'right_indicator', 'hazard', 'horn',
-]);
+] as const;
 
 const BLINKS_PER_S = 1.5;
 const FLASHES_PER_S = 2;
@@ -16,11 +16,11 @@ const FLASHES_PER_S = 2;
 /**
  * Return the lights that are lit at a time: some blink in simulation time.
  *
- * @param {number|undefined} lights bits; undefined means none
- * @param {number} t simulation time [s]
- * @returns {{left: boolean, right: boolean, horn: boolean, brake: boolean, blue: boolean}}
+ * @param lights bits; undefined means none
+ * @param t simulation time [s]
  */
-export function shining(lights, t) {
+export function shining(lights: number | undefined,
+  t: number): { left: boolean; right: boolean; horn: boolean; brake: boolean; blue: boolean } {
   const bits = Number.isFinite(lights) ? Number(lights) : 0;
   const lit = (t * BLINKS_PER_S) % 1 < 0.5;
   return {

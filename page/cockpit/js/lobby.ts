@@ -5,9 +5,9 @@
 import { element, setAttribute, setText } from './dom.js';
 import { describeSeat } from './driving/seat_text.js';
 
-/** @import { Connection } from './connection.js' */
-/** @import { RequestMessage, Seat } from './messages.js' */
-/** @import { Store } from './store.js' */
+import type { Connection } from './connection.js';
+import type { RequestMessage, Seat } from './messages.js';
+import type { Store } from './store.js';
 
 /** The lobby in the Drive panel and the countdown on the stage. */
 class Lobby {
@@ -27,31 +27,26 @@ class Lobby {
   #countdown = element('div', { class: 'countdown', role: 'timer', 'aria-live': 'assertive',
     hidden: true });
 
-  /**
-   * @param {HTMLElement} stage
-   * @param {Store} store
-   * @param {Connection} connection
-   */
-  constructor(stage, store, connection) {
+  constructor(stage: HTMLElement, store: Store, connection: Connection) {
     this.#store = store;
     this.#connection = connection;
     stage.append(this.#countdown);
     document.querySelector('#panel-drive')?.prepend(this.#section);
-    for (const event of /** @type {const} */ (['hello', 'you', 'seats', 'status',
-      'connection'])) {
+    for (const event of ['hello', 'you', 'seats', 'status',
+      'connection'] as const) {
       store.on(event, () => this.#show());
     }
     this.#show();
   }
 
-  /** @returns {[string, Seat][]} the seats that the game leaves to people at pages */
-  get #seats() {
+  /** @returns the seats that the game leaves to people at pages */
+  get #seats(): [string, Seat][] {
     return Object.entries(this.#store.seats).filter(
       ([, { driver, source }]) => driver === 'cockpit' && source === 'cockpit');
   }
 
-  /** @returns {string|undefined} the seat that this page holds */
-  get #mine() {
+  /** @returns the seat that this page holds */
+  get #mine(): string | undefined {
     const { me } = this.#store;
     return this.#seats.find(([, { holder }]) => holder === me.id && me.id !== '')?.[0];
   }
@@ -80,11 +75,7 @@ class Lobby {
     setAttribute(this.#all, 'hidden', !rights.directs || this.#seats.length < 2);
   }
 
-  /**
-   * @param {string} id
-   * @param {Seat} seat
-   */
-  #row(id, seat) {
+  #row(id: string, seat: Seat) {
     const { me } = this.#store;
     const state = seat.holder === null ? 'free' : seat.ready ? 'ready' : 'not ready yet';
     return element('li', { 'data-ready': Boolean(seat.ready) && seat.holder !== null },
@@ -101,8 +92,7 @@ class Lobby {
     }
   }
 
-  /** @param {RequestMessage} message */
-  async #request(message) {
+  async #request(message: RequestMessage) {
     const { ok, text } = await this.#connection.request(message);
     if (!ok) {
       this.#store.receive({ type: 'notice', level: 'warn', text });
@@ -110,14 +100,7 @@ class Lobby {
   }
 }
 
-/**
- * Put the lobby into the Drive panel and the countdown over the picture.
- *
- * @param {HTMLElement} stage
- * @param {Store} store
- * @param {Connection} connection
- * @returns {Lobby}
- */
-export function createLobby(stage, store, connection) {
+/** Put the lobby into the Drive panel and the countdown over the picture. */
+export function createLobby(stage: HTMLElement, store: Store, connection: Connection): Lobby {
   return new Lobby(stage, store, connection);
 }

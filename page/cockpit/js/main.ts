@@ -14,11 +14,11 @@ const bare = readStage(window.location.search) !== null;
 document.documentElement.classList.toggle('bare', bare);
 const parts = bare ? [['./stage/stage.js', 'createStage', '#stage', 'stage'],
   ...PARTS.filter(([, , , name]) => STAGE.includes(name))] : PARTS;
-addPanels(/** @type {HTMLElement} */ (document.querySelector('#panels')));
+addPanels(document.querySelector('#panels') as HTMLElement);
 const store = new Store();
 const connection = new Connection(store);
 const world = createWorld(
-  /** @type {HTMLCanvasElement} */ (document.querySelector('#world')), store,
+  document.querySelector('#world') as HTMLCanvasElement, store,
   { connection, covered: document.querySelector('#hud'), keys: !bare, toolbar: !bare,
     sight: () => driverSight(store) });
 window.crgame = { store, connection, world };

@@ -5,387 +5,339 @@
  *
  * The server's side is crgame_ros/cockpit/scene.py (with map_lanelets.py and
  * road_furniture.py), run_status.py, seat_table.py, run_files.py,
- * library.py, replay_backend.py and, for the page's messages, page_messages.py. The binary frames
- * are in frames.js. Polylines and polygons are flat lists x0, y0, x1, y1, … [m].
- *
- * @typedef {[xmin: number, ymin: number, xmax: number, ymax: number]} Box [m]
- * @typedef {{x: number, y: number, yaw: number, speed: number}} Pose [m, rad, m/s]
+ * replay_backend.py and, for the page's messages, page_messages.py. The binary frames
+ * are in frames.ts. Polylines and polygons are flat lists x0, y0, x1, y1, … [m].
  */
 
-export {};
+import type { Control, Input, PageMessage, Role, SeenView, Unnumbered } from './page_messages.js';
+import type { PeopleMessage, Rights, YouMessage } from './people_messages.js';
+import type { GameTask, TasksMessage } from './tasks/task_messages.js';
 
-/** @import { PeopleMessage, Rights, YouMessage } from './people_messages.js' */
-/** @import { GameTask, TasksMessage } from './tasks/task_messages.js' */
+export type Box = [xmin: number, ymin: number, xmax: number, ymax: number]; // [m]
+export interface Pose { x: number; y: number; yaw: number; speed: number } // [m, rad, m/s]
 
-/**
- * @typedef {object} Shape
- * @property {'rectangle'|'circle'|'polygon'} kind
- * @property {number} length [m]
- * @property {number} width [m]
- * @property {number[]} vertices of a polygon, flat
- */
+export interface Shape {
+  kind: 'rectangle' | 'circle' | 'polygon';
+  length: number; // [m]
+  width: number; // [m]
+  vertices: number[]; // of a polygon, flat
+}
 
-/**
- * @typedef {object} Lanelet
- * @property {number} id
- * @property {number[]} left bound
- * @property {number[]} right bound
- * @property {number[]} center line
- * @property {number[]|null} [left_z] heights of the left bound's points [m], null where flat
- * @property {number[]|null} [right_z]
- * @property {string[]} types CommonRoad's
- * @property {string} left_line marking of the bound, as CommonRoad calls it
- * @property {string} right_line
- * @property {boolean} one_way
- * @property {number|null} speed_limit [m/s]
- * @property {boolean} intersection
- * @property {number|null} adj_left id of the neighbour
- * @property {boolean} adj_left_same whether it leads the same way
- * @property {number|null} adj_right
- * @property {boolean} adj_right_same
- * @property {number[]} successors
- */
+export interface Lanelet {
+  id: number;
+  left: number[]; // bound
+  right: number[]; // bound
+  center: number[]; // line
+  left_z?: number[] | null; // heights of the left bound's points [m], null where flat
+  right_z?: number[] | null;
+  types: string[]; // CommonRoad's
+  left_line: string; // marking of the bound, as CommonRoad calls it
+  right_line: string;
+  one_way: boolean;
+  speed_limit: number | null; // [m/s]
+  intersection: boolean;
+  adj_left: number | null; // id of the neighbour
+  adj_left_same: boolean; // whether it leads the same way
+  adj_right: number | null;
+  adj_right_same: boolean;
+  successors: number[];
+}
 
-/**
- * A traffic light; `yaw` is the heading [rad] of the traffic that it controls.
- *
- * @typedef {{id: number, x: number, y: number, yaw: number, direction: string,
- *   lanelets: number[]}} Light
- */
+/** A traffic light; `yaw` is the heading [rad] of the traffic that it controls. */
+export interface Light {
+  id: number;
+  x: number;
+  y: number;
+  yaw: number;
+  direction: string;
+  lanelets: number[];
+}
 
 /**
  * A traffic sign, named as in TrafficSignIDGermany and the like; `yaw` is its traffic's heading.
- *
- * @typedef {{id: number, x: number, y: number, yaw: number, lanelets: number[], kind: string,
- *   value: string, virtual: boolean}} Sign
  */
+export interface Sign {
+  id: number;
+  x: number;
+  y: number;
+  yaw: number;
+  lanelets: number[];
+  kind: string;
+  value: string;
+  virtual: boolean;
+}
 
-/** @typedef {{light: 'day'|'dusk', visibility: number}} Environment visibility [m] */
+export interface Environment { light: 'day' | 'dusk'; visibility: number } // visibility [m]
 
-/**
- * Points of a vehicle: ahead of the rear axle, to the left, above the road.
- *
- * @typedef {[x: number, y: number, z: number]} Mount [m]
- * @typedef {{height: number, bonnet_height: number, eye: Mount, left_mirror: Mount,
- *   right_mirror: Mount, inner_mirror: Mount|null}} DriverPlace [m]; a vehicle without an inner
- *   mirror has no cabin
- */
+// Points of a vehicle: ahead of the rear axle, to the left, above the road.
+export type Mount = [x: number, y: number, z: number]; // [m]
 
-/**
- * @typedef {object} SceneVehicle
- * @property {string} id
- * @property {'human'|'autonomous'} role
- * @property {Shape} shape
- * @property {number} rear_to_center [m]
- * @property {number} wheelbase [m]
- * @property {number} max_steering_angle [rad]
- * @property {string} type CommonRoad obstacle type
- * @property {'combustion'|'electric'|'muscle'} powertrain
- * @property {DriverPlace} driver_place
- * @property {{localisation: boolean, sensors: string[], range: number|null}|null} perception
- *   range [m], null for no limit
- */
+// [m]; a vehicle without an inner mirror has no cabin
+export interface DriverPlace {
+  height: number;
+  bonnet_height: number;
+  eye: Mount;
+  left_mirror: Mount;
+  right_mirror: Mount;
+  inner_mirror: Mount | null;
+}
 
-/** @typedef {'recorded'|'static'|'traffic'|'scripted'} ObjectRole */
-/** @typedef {{id: string, type: string, role: ObjectRole, shape: Shape}} SceneObject */
+export interface SceneVehicle {
+  id: string;
+  role: 'human' | 'autonomous';
+  shape: Shape;
+  rear_to_center: number; // [m]
+  wheelbase: number; // [m]
+  max_steering_angle: number; // [rad]
+  type: string; // CommonRoad obstacle type
+  powertrain: 'combustion' | 'electric' | 'muscle';
+  driver_place: DriverPlace;
+  // range [m], null for no limit
+  perception: { localisation: boolean; sensors: string[]; range: number | null } | null;
+}
 
-/**
- * The action of an event of the game, by its kind.
- *
- * @typedef {{kind: 'release', object: string}} ReleaseAction
- * @typedef {{kind: 'brake', object: string, deceleration: number, speed: number}} BrakeAction
- * @typedef {{kind: 'obstacle', x: number, y: number, length: number, width: number,
- *   type: string}} ObstacleAction
- * @typedef {{kind: 'speed_limit', speed: number, lanelets: number[]}} SpeedLimitAction
- * @typedef {{kind: 'plan_display', av: string, show: boolean}} PlanDisplayAction
- * @typedef {{kind: 'planner', av: string, planner: string}} PlannerAction
- * @typedef {{kind: 'planner_run', av: string, run: boolean}} PlannerRunAction
- * @typedef {ReleaseAction|BrakeAction|ObstacleAction|SpeedLimitAction|TrafficAction
- *   |PlanDisplayAction|PlannerAction|PlannerRunAction} EventAction
- */
+export type ObjectRole = 'recorded' | 'static' | 'traffic' | 'scripted';
+export interface SceneObject { id: string; type: string; role: ObjectRole; shape: Shape }
 
-/**
- * @typedef {object} TrafficAction
- * @property {'traffic'} kind
- * @property {string} agent id, or all
- * @property {Record<string, unknown>} [options]
- * @property {number} [speed_factor]
- * @property {number} [desired_speed] [m/s]
- * @property {number} [politeness]
- * @property {boolean} [lane_changes]
- * @property {number} [reaction_time] [s]
- * @property {number} [imperfection]
- * @property {boolean} [red_runner]
- * @property {boolean} [late_yielder]
- */
+// The action of an event of the game, by its kind.
+export interface ReleaseAction { kind: 'release'; object: string }
+export interface BrakeAction { kind: 'brake'; object: string; deceleration: number; speed: number }
 
-/**
- * @typedef {{time: number}|{step: number}|{between: [string, string], distance: number}
- *   |{vehicle: string, x: number, y: number, radius: number}} EventCondition
- * @typedef {{name: string, label: string, when: EventCondition|null} & EventAction} GameEvent
- */
+export interface ObstacleAction {
+  kind: 'obstacle';
+  x: number;
+  y: number;
+  length: number;
+  width: number;
+  type: string;
+}
 
-/**
- * @typedef {object} SceneTime
- * @property {number} epoch counts resets
- * @property {number} dt_s
- * @property {number} dt_c_s of a scenario step
- * @property {number} k0
- * @property {number} clock_offset_s
- * @property {number|null} duration_s
- */
+export interface SpeedLimitAction { kind: 'speed_limit'; speed: number; lanelets: number[] }
+export interface PlanDisplayAction { kind: 'plan_display'; av: string; show: boolean }
+export interface PlannerAction { kind: 'planner'; av: string; planner: string }
+export interface PlannerRunAction { kind: 'planner_run'; av: string; run: boolean }
+export type EventAction = ReleaseAction | BrakeAction | ObstacleAction | SpeedLimitAction
+  | TrafficAction | PlanDisplayAction | PlannerAction | PlannerRunAction;
 
-/**
- * @typedef {object} Scene everything that does not change during a run
- * @property {string} id
- * @property {string} benchmark_id
- * @property {string} title
- * @property {Box} bounds
- * @property {string} country three letters, ZAM if unknown
- * @property {Environment} environment
- * @property {Lanelet[]} lanelets
- * @property {number[][]} gaps slits between lanelets, for display only
- * @property {{points: number[], lanelet: number, line: string}[]} stop_lines
- * @property {Light[]} lights
- * @property {Sign[]} signs
- * @property {SceneVehicle[]} vehicles
- * @property {SceneObject[]} objects
- * @property {{av: string, polygons: number[][]}[]} goals
- * @property {SceneTime} time
- * @property {Record<string, string>} drivers
- * @property {Record<string, string>} planners
- * @property {boolean} occupancy whether there is a map of permanent obstacles
- * @property {GameEvent[]} events
- * @property {GameTask[]} [tasks]
- * @property {string} [language] of the texts for drivers
- * @property {'through'|'stop'} contact what a contact does to a vehicle that a person drives
- * @property {'on'|'none'} sound whether pages may sound and gamepads rumble
- * @property {number} [again] counts how often a recording was played
- */
+export interface TrafficAction {
+  kind: 'traffic';
+  agent: string; // id, or all
+  options?: Record<string, unknown>;
+  speed_factor?: number;
+  desired_speed?: number; // [m/s]
+  politeness?: number;
+  lane_changes?: boolean;
+  reaction_time?: number; // [s]
+  imperfection?: number;
+  red_runner?: boolean;
+  late_yielder?: boolean;
+}
 
-/** @typedef {{client: string, name: string}} Person */
+export type EventCondition = { time: number } | { step: number }
+  | { between: [string, string]; distance: number }
+  | { vehicle: string; x: number; y: number; radius: number };
+export type GameEvent = { name: string; label: string; when: EventCondition | null } & EventAction;
 
-/**
- * @typedef {object} Seat
- * @property {string} source of the commands that the vehicle obeys
- * @property {string} driver the source that the game names
- * @property {string|null} holder id of a client
- * @property {string|null} holder_name
- * @property {Person[]} [requests] persons that ask for it
- * @property {Person[]} [others] persons that could get it
- * @property {Person|null} [offer] person to which its holder offers it
- * @property {{name: string, for_s: number}|null} [kept] for its absent driver, and how long
- * @property {boolean} [ready] whether its driver is ready to begin
- * @property {string} [device] of its driver, as its page reports it
- * @property {boolean} [lost] whether its driver is silent
- */
+export interface SceneTime {
+  epoch: number; // counts resets
+  dt_s: number;
+  dt_c_s: number; // of a scenario step
+  k0: number;
+  clock_offset_s: number;
+  duration_s: number | null;
+}
 
-/** @typedef {{name: string, n: number, k: number, by: string}} FiredEvent */
+/** Everything that does not change during a run. */
+export interface Scene {
+  id: string;
+  benchmark_id: string;
+  title: string;
+  bounds: Box;
+  country: string; // three letters, ZAM if unknown
+  environment: Environment;
+  lanelets: Lanelet[];
+  gaps: number[][]; // slits between lanelets, for display only
+  stop_lines: { points: number[]; lanelet: number; line: string }[];
+  lights: Light[];
+  signs: Sign[];
+  vehicles: SceneVehicle[];
+  objects: SceneObject[];
+  goals: { av: string; polygons: number[][] }[];
+  time: SceneTime;
+  drivers: Record<string, string>;
+  planners: Record<string, string>;
+  occupancy: boolean; // whether there is a map of permanent obstacles
+  events: GameEvent[];
+  tasks?: GameTask[];
+  language?: string; // of the texts for drivers
+  contact: 'through' | 'stop'; // what a contact does to a vehicle that a person drives
+  sound: 'on' | 'none'; // whether pages may sound and gamepads rumble
+  again?: number; // counts how often a recording was played
+}
 
-/**
- * @typedef {object} Alarm
- * @property {string} id
- * @property {string} kind
- * @property {string} subject
- * @property {string} text
- * @property {number} [since_t] [s]
- */
+export interface Person { client: string; name: string }
 
-/** @typedef {'waiting'|'running'|'paused'|'ended'} RunState */
+export interface Seat {
+  source: string; // of the commands that the vehicle obeys
+  driver: string; // the source that the game names
+  holder: string | null; // id of a client
+  holder_name: string | null;
+  requests?: Person[]; // persons that ask for it
+  others?: Person[]; // persons that could get it
+  offer?: Person | null; // person to which its holder offers it
+  kept?: { name: string; for_s: number } | null; // for its absent driver, and how long
+  ready?: boolean; // whether its driver is ready to begin
+  device?: string; // of its driver, as its page reports it
+  lost?: boolean; // whether its driver is silent
+}
 
-/**
- * @typedef {object} Recording
- * @property {'none'|'recording'|'recorded'|'failed'|'unknown'} state
- * @property {number} [messages]
- * @property {number} [megabytes]
- * @property {string} [text]
- */
+export interface FiredEvent { name: string; n: number; k: number; by: string }
 
-/**
- * @typedef {object} PlannerStatus
- * @property {boolean} running
- * @property {boolean} stale
- * @property {number|null} latency_ms
- * @property {number|null} age_ms
- * @property {number} accepted
- * @property {number} refused
- * @property {number} of_others plans of other programs than its planner
- * @property {string} failure why it braked last
- * @property {number|null} plan_time_ms
- * @property {number|null} fallbacks
- * @property {string} planner
- * @property {string} last_refusal
- * @property {Record<string, number|null>|null} tracking
- */
+export interface Alarm {
+  id: string;
+  kind: string;
+  subject: string;
+  text: string;
+  since_t?: number; // [s]
+}
 
-/**
- * Figures and texts of the time-sync supervisor by key; in timing.json some are nested.
- *
- * @typedef {Record<string, number|boolean|string|null|undefined|Record<string, number|null>>
- *   } Timing
- */
+export type RunState = 'waiting' | 'running' | 'paused' | 'ended';
 
-/** @typedef {{vehicle: string, with: string, t: number}} Contact */
-/** @typedef {{vehicle: string, with: string, side: string, avoidable_by: string}} NamedContact */
+export interface Recording {
+  state: 'none' | 'recording' | 'recorded' | 'failed' | 'unknown';
+  messages?: number;
+  megabytes?: number;
+  text?: string;
+}
 
-/**
- * A measure of criticality.
- *
- * @typedef {object} Measure
- * @property {string} name
- * @property {string} label
- * @property {string} unit
- * @property {-1|1} worst whether smaller (-1) or greater (1) values are more critical
- * @property {number|null} limit beyond which it is critical; null for none
- * @property {string} definition
- */
+export interface PlannerStatus {
+  running: boolean;
+  stale: boolean;
+  latency_ms: number | null;
+  age_ms: number | null;
+  accepted: number;
+  refused: number;
+  of_others: number; // plans of other programs than its planner
+  failure: string; // why it braked last
+  plan_time_ms: number | null;
+  fallbacks: number | null;
+  planner: string;
+  last_refusal: string;
+  tracking: Record<string, number | null> | null;
+}
 
-/**
- * A measure of a vehicle over a whole run.
- *
- * @typedef {object} Exposure
- * @property {string} name
- * @property {string} label
- * @property {string} unit
- * @property {string} definition
- */
+/** Figures and texts of the time-sync supervisor by key; in timing.json some are nested. */
+export type Timing = Record<string, number | boolean | string | null | undefined
+  | Record<string, number | null>>;
 
-/**
- * The worst values so far by measure, and the thresholds of criticality.
- *
- * @typedef {object} Criticality
- * @property {boolean} critical now
- * @property {Record<string, number|null>} exposures over the run so far, by name
- * @property {Record<string, {value: number|null, of: string, t: number|null}>} worst
- * @property {Record<string, number|null>} thresholds
- */
+export interface Contact { vehicle: string; with: string; t: number }
+export interface NamedContact { vehicle: string; with: string; side: string; avoidable_by: string }
 
-/**
- * @typedef {object} Status
- * @property {RunState} run
- * @property {string} [reason] why it ended
- * @property {boolean} [stays] whether the program continues after the run
- * @property {string[]} [awaited] seats without a driver
- * @property {number} [countdown_s] until the run begins; 0 for none
- * @property {Contact[]} [contacts]
- * @property {{vehicle: string, t: number}[]} [departures]
- * @property {number} real_time_factor
- * @property {number|null} measured_factor
- * @property {Recording} recording
- * @property {Timing|null} timing
- * @property {Record<string, PlannerStatus>} planners
- * @property {Record<string, {collision: boolean, off_road: boolean, hit: string[]}>} drivability
- * @property {Record<string, Criticality>} [criticality]
- * @property {Record<string, boolean>} seats_lost
- * @property {boolean} frames_skipped
- * @property {number} t [s]
- * @property {number} n
- * @property {number} k
- * @property {number} epoch
- * @property {number} clients
- */
+/** A measure of criticality. */
+export interface Measure {
+  name: string;
+  label: string;
+  unit: string;
+  worst: -1 | 1; // whether smaller (-1) or greater (1) values are more critical
+  limit: number | null; // beyond which it is critical; null for none
+  definition: string;
+}
 
-/**
- * @typedef {object} Files
- * @property {number} epoch
- * @property {string} run id in /api/runs
- * @property {string} folder
- * @property {string[]} names
- * @property {boolean} complete
- * @property {NamedContact[]} contacts
- */
+/** A measure of a vehicle over a whole run. */
+export interface Exposure {
+  name: string;
+  label: string;
+  unit: string;
+  definition: string;
+}
 
-/**
- * The answers of /api/runs and /api/runs/score about a run.
- *
- * @typedef {object} PastRun
- * @property {string} id
- * @property {string} name
- * @property {string} title
- * @property {string} scenario
- * @property {number|null} began_ms since 1970
- * @property {number|null} duration_s of its recording
- * @property {number|null} contacts null if unknown
- * @property {boolean} closed whether it can be read
- * @property {boolean} finished whether it can be deleted
- * @property {boolean} own whether it belongs to this session
- * @property {number} bytes
- * @property {{name: string, bytes: number}[]} files
- *
- * @typedef {{name: string, value: number|null, weight: number, definition: string}} ScorePart
- * @typedef {object} VehicleScore
- * @property {string} vehicle
- * @property {string} role
- * @property {number|null} score of 1
- * @property {ScorePart[]} parts
- * @property {number|null} distance [m]
- * @property {number|null} fastest [m/s]
- * @property {string[]} remarks
- * @typedef {{vehicles: VehicleScore[], refusal: string}} Score
- */
+/** The worst values so far by measure, and the thresholds of criticality. */
+export interface Criticality {
+  critical: boolean; // now
+  exposures: Record<string, number | null>; // over the run so far, by name
+  worst: Record<string, { value: number | null; of: string; t: number | null }>;
+  thresholds: Record<string, number | null>;
+}
 
-/** @typedef {'info'|'warn'|'error'} NoticeLevel */
+export interface Status {
+  run: RunState;
+  reason?: string; // why it ended
+  stays?: boolean; // whether the program continues after the run
+  awaited?: string[]; // seats without a driver
+  countdown_s?: number; // until the run begins; 0 for none
+  contacts?: Contact[];
+  departures?: { vehicle: string; t: number }[];
+  real_time_factor: number;
+  measured_factor: number | null;
+  recording: Recording;
+  timing: Timing | null;
+  planners: Record<string, PlannerStatus>;
+  drivability: Record<string, { collision: boolean; off_road: boolean; hit: string[] }>;
+  criticality?: Record<string, Criticality>;
+  seats_lost: Record<string, boolean>;
+  frames_skipped: boolean;
+  t: number; // [s]
+  n: number;
+  k: number;
+  epoch: number;
+  clients: number;
+}
 
-/**
- * Messages from the server to the store.
- *
- * @typedef {{type: 'hello', client: string, name: string, mode: 'live'|'replay',
- *   version: string, program?: string, rights: Rights, framed_by?: string,
- *   measures?: Measure[], exposures?: Exposure[]}} HelloMessage
- * @typedef {{type: 'scene'} & Scene} SceneMessage
- * @typedef {{type: 'seats', seats: Record<string, Seat>}} SeatsMessage
- * @typedef {{type: 'signals', k: number, states: Record<string, string>,
- *   objects: Record<string, number>}} SignalsMessage
- * @typedef {{type: 'events', fired: FiredEvent[]}} EventsMessage
- * @typedef {{type: 'alarms', active: Alarm[]}} AlarmsMessage
- * @typedef {{type: 'status'} & Status} StatusMessage
- * @typedef {{type: 'files'} & Files} FilesMessage
- * @typedef {{type: 'notice', level: NoticeLevel, text: string}} NoticeMessage
- * @typedef {HelloMessage|SceneMessage|SeatsMessage|SignalsMessage|EventsMessage|AlarmsMessage
- *   |StatusMessage|FilesMessage|NoticeMessage|YouMessage|PeopleMessage|TasksMessage} StoreMessage
- */
+export interface Files {
+  epoch: number;
+  run: string; // id in /api/runs
+  folder: string;
+  names: string[];
+  complete: boolean;
+  contacts: NamedContact[];
+}
 
-/**
- * Answers of the server to one page.
- *
- * @typedef {{ok: boolean, text: string}} Reply
- * @typedef {{type: 'reply', to: number} & Reply} ReplyMessage
- * @typedef {{type: 'pong', t: number}} PongMessage
- * @typedef {StoreMessage|ReplyMessage|PongMessage} ServerMessage
- */
+export type NoticeLevel = 'info' | 'warn' | 'error';
 
-/**
- * Messages from the page, as the server declares them; requests get their number when they are
- * sent.
- *
- * @typedef {import('./page_messages.js').PageMessage} PageMessage
- * @typedef {import('./page_messages.js').Unnumbered<PageMessage>} RequestMessage
- * @typedef {Omit<import('./page_messages.js').Input, 'type'|'seat'>} Hands
- * @typedef {import('./page_messages.js').Control['action']} RunAction
- * @typedef {import('./page_messages.js').SeenView} ViewMessage
- * @typedef {import('./page_messages.js').Role['role']} RoleName
- */
+// Messages from the server to the store.
+export interface HelloMessage {
+  type: 'hello';
+  client: string;
+  name: string;
+  mode: 'live' | 'replay';
+  version: string;
+  program?: string;
+  rights: Rights;
+  framed_by?: string;
+  measures?: Measure[];
+  exposures?: Exposure[];
+}
 
-/**
- * Types of /api/scenarios, /api/preview, /api/planner and /api/load.
- *
- * @typedef {{id: string, kind: 'game'|'scenario'|'upload', name: string, title: string}} Entry
- * @typedef {{folders: {name: string, entries: Entry[]}[], planners: string[],
- *   drivers: string[]}} Offer
- * @typedef {{id: string, planner: string, planning_problem: number|null,
- *   options?: Record<string, string>}} PreviewAv
- * @typedef {{name: string, wanted: string, default: string, meaning: string}} PlannerOption
- * @typedef {object} Preview
- * @property {Scene} scene
- * @property {{vehicles: (number|null)[][], objects: (number|null)[][]}} states rows, as in frames
- * @property {{id: string, driver: string}[]} humans
- * @property {PreviewAv[]} avs
- * @property {string[]} notices
- */
+export interface SceneMessage extends Scene { type: 'scene' }
+export interface SeatsMessage { type: 'seats'; seats: Record<string, Seat> }
 
-/**
- * @typedef {object} Choice
- * @property {string} id of an entry
- * @property {{id: string, driver: string}[]} humans
- * @property {{id: string, planner: string, options?: Record<string, string>}[]} avs
- */
+export interface SignalsMessage {
+  type: 'signals';
+  k: number;
+  states: Record<string, string>;
+  objects: Record<string, number>;
+}
+
+export interface EventsMessage { type: 'events'; fired: FiredEvent[] }
+export interface AlarmsMessage { type: 'alarms'; active: Alarm[] }
+export interface StatusMessage extends Status { type: 'status' }
+export interface FilesMessage extends Files { type: 'files' }
+export interface NoticeMessage { type: 'notice'; level: NoticeLevel; text: string }
+export type StoreMessage = HelloMessage | SceneMessage | SeatsMessage | SignalsMessage
+  | EventsMessage | AlarmsMessage | StatusMessage | FilesMessage | NoticeMessage | YouMessage
+  | PeopleMessage | TasksMessage;
+
+// Answers of the server to one page.
+export interface Reply { ok: boolean; text: string }
+export interface ReplyMessage extends Reply { type: 'reply'; to: number }
+export interface PongMessage { type: 'pong'; t: number }
+export type ServerMessage = StoreMessage | ReplyMessage | PongMessage;
+
+// Messages from the page, as the server declares them; requests get their number when they are
+// sent.
+export type { PageMessage };
+export type RequestMessage = Unnumbered<PageMessage>;
+export type Hands = Omit<Input, 'type' | 'seat'>;
+export type RunAction = Control['action'];
+export type ViewMessage = SeenView;
+export type RoleName = Role['role'];

@@ -5,10 +5,10 @@
 /**
  * Return the outline of a lanelet: its left bound, then its right one reversed.
  *
- * @param {{left: number[], right: number[]}} lanelet with flat bounds
- * @returns {number[]} flat polygon
+ * @param lanelet with flat bounds
+ * @returns flat polygon
  */
-export function outlineOf({ left, right }) {
+export function outlineOf({ left, right }: { left: number[]; right: number[] }): number[] {
   const outline = [...left];
   for (let i = right.length - 2; i >= 0; i -= 2) {
     outline.push(right[i], right[i + 1]);
@@ -17,12 +17,11 @@ export function outlineOf({ left, right }) {
 }
 
 /**
- * @param {number[]} points flat
- * @returns {[number, number, number, number]} xmin, ymin, xmax, ymax
+ * @param points flat
+ * @returns xmin, ymin, xmax, ymax
  */
-export function boxOf(points) {
-  /** @type {[number, number, number, number]} */
-  const box = [Infinity, Infinity, -Infinity, -Infinity];
+export function boxOf(points: number[]): [number, number, number, number] {
+  const box: [number, number, number, number] = [Infinity, Infinity, -Infinity, -Infinity];
   for (let i = 0; i < points.length; i += 2) {
     box[0] = Math.min(box[0], points[i]);
     box[1] = Math.min(box[1], points[i + 1]);
@@ -35,11 +34,11 @@ export function boxOf(points) {
 /**
  * Return whether a point is within a polygon.
  *
- * @param {number[]} ring flat polygon
- * @param {number} x [m]
- * @param {number} y [m]
+ * @param ring flat polygon
+ * @param x [m]
+ * @param y [m]
  */
-export function contains(ring, x, y) {
+export function contains(ring: number[], x: number, y: number) {
   let inside = false;
   for (let i = 0, j = ring.length - 2; i < ring.length; j = i, i += 2) {
     if ((ring[i + 1] > y) !== (ring[j + 1] > y)

@@ -6,10 +6,8 @@
  * The panels at the right, in the order of their tabs. A panel needs an entry here, and one or
  * more parts in `#panel-<name>`. `saves` tells what can be saved: the plots of the part of that
  * name, and all tables.
- *
- * @type {{name: string, label: string, saves?: ('plots'|'tables')[]}[]}
  */
-export const PANELS = [
+export const PANELS: { name: string; label: string; saves?: ('plots' | 'tables')[] }[] = [
   { name: 'drive', label: 'Drive' },
   { name: 'history', label: 'History', saves: ['plots'] },
   { name: 'scenario', label: 'Scenario' },

@@ -5,14 +5,13 @@
 import { element, setAttribute, setText } from './dom.js';
 import { oneLine } from './panels/format.js';
 
-/** @import { Connection } from './connection.js' */
-/** @import { DeviceDelay, Present } from './people_messages.js' */
-/** @import { RoleName } from './messages.js' */
-/** @import { Store } from './store.js' */
+import type { Connection } from './connection.js';
+import type { DeviceDelay, Present } from './people_messages.js';
+import type { RoleName } from './messages.js';
+import type { Store } from './store.js';
 
-/** @type {[role: string, text: string][]} */
-const ROLES = [['all', 'Director and driver'], ['direct', 'Director'], ['drive', 'Driver'],
-  ['watch', 'Spectator']];
+const ROLES: [role: string, text: string][] = [['all', 'Director and driver'],
+  ['direct', 'Director'], ['drive', 'Driver'], ['watch', 'Spectator']];
 
 const ROLE = 'crgame.role';
 
@@ -29,19 +28,14 @@ class People {
     'aria-label': 'The link', on: { focus: () => this.#link.select() } });
   #error = element('p', { class: 'field-error', role: 'alert' });
   #invite = element('form', { class: 'people-invite', hidden: true,
-    on: { submit: (/** @type {Event} */ event) => this.#makeLink(event) } },
+    on: { submit: (event: Event) => this.#makeLink(event) } },
   this.#whom, element('button', { type: 'submit', class: 'drive-button', text: 'Make a link',
     title: 'A link that lets one browser in' }), this.#link, this.#error);
   #shown = '';
   // A role that this page may not have is asked for once.
   #refused = '';
 
-  /**
-   * @param {HTMLElement} root
-   * @param {Store} store
-   * @param {Connection} connection
-   */
-  constructor(root, store, connection) {
+  constructor(root: HTMLElement, store: Store, connection: Connection) {
     this.#store = store;
     this.#connection = connection;
     const section = element('section', { class: 'drive-section',
@@ -49,7 +43,7 @@ class People {
     element('h2', { id: 'people-title', text: 'People' }), this.#roleRow, this.#list,
     this.#invite);
     root.append(section);
-    for (const event of /** @type {const} */ (['hello', 'you', 'people', 'scene'])) {
+    for (const event of ['hello', 'you', 'people', 'scene'] as const) {
       store.on(event, () => {
         setAttribute(section, 'hidden', store.mode === 'replay');
         this.#show();
@@ -85,8 +79,7 @@ class People {
       element('option', { value: 'direct', text: 'direct' }));
   }
 
-  /** @param {Present} person */
-  #row({ client, name, role, seat, round_trip_ms, input_delay_ms }) {
+  #row({ client, name, role, seat, round_trip_ms, input_delay_ms }: Present) {
     const me = client === this.#store.me.id ? ' (you)' : '';
     const delays = [
       round_trip_ms === null ? '' : `round trip ${round_trip_ms.toFixed(0)} ms`,
@@ -102,7 +95,7 @@ class People {
     // A select that keeps the focus would take the driving keys.
     this.#role.blur();
     sessionStorage.setItem(ROLE, this.#role.value);
-    this.#requestRole(/** @type {RoleName} */ (this.#role.value));
+    this.#requestRole(this.#role.value as RoleName);
   }
 
   /** Restore the chosen role: a new connection begins with all granted rights. */
@@ -111,12 +104,11 @@ class People {
       ?? new URLSearchParams(window.location.search).get('role');
     if (this.#store.me.id !== '' && this.#store.mode === 'live' && role !== this.#refused
         && ROLES.some(([known]) => known === role)) {
-      this.#requestRole(/** @type {RoleName} */ (role));
+      this.#requestRole(role as RoleName);
     }
   }
 
-  /** @param {RoleName} role */
-  async #requestRole(role) {
+  async #requestRole(role: RoleName) {
     const { ok, text } = await this.#connection.request({ type: 'role', role });
     if (!ok) {
       this.#refused = role;
@@ -124,8 +116,7 @@ class People {
     }
   }
 
-  /** @param {Event} event */
-  async #makeLink(event) {
+  async #makeLink(event: Event) {
     event.preventDefault();
     const [role, seat = ''] = this.#whom.value.split(' ');
     let answer;
@@ -145,8 +136,7 @@ class People {
   }
 }
 
-/** @param {DeviceDelay} delay */
-function deviceRow({ seat, device, command_ms, input_delay_ms }) {
+function deviceRow({ seat, device, command_ms, input_delay_ms }: DeviceDelay) {
   const delays = [
     command_ms === null ? '' : `command latency ${command_ms.toFixed(1)} ms`,
     input_delay_ms === null ? '' : `input latency ${input_delay_ms.toFixed(0)} ms`,
@@ -159,11 +149,8 @@ function deviceRow({ seat, device, command_ms, input_delay_ms }) {
 /**
  * Put the list of people into the Drive panel.
  *
- * @param {HTMLElement} root the panel
- * @param {Store} store
- * @param {Connection} connection
- * @returns {People}
+ * @param root the panel
  */
-export function createPeople(root, store, connection) {
+export function createPeople(root: HTMLElement, store: Store, connection: Connection): People {
   return new People(root, store, connection);
 }

@@ -6,8 +6,9 @@ import { KIND } from './frames.js';
 import { turn } from './interpolation.js';
 import { SampleRing } from './samples.js';
 
-/** @import { EstimateFrame, OccupancyFrame, PerceptionFrame, ScanFrame } from './frames.js' */
-/** @import { SeenFrame } from './frames.js' */
+import type {
+  EstimateFrame, OccupancyFrame, PerceptionFrame, ScanFrame, SeenFrame,
+} from './frames.js';
 
 // 3 s at the 30 Hz of a live run, 1 s at the 100 Hz of a recording.
 const ESTIMATES = 100;
@@ -21,34 +22,31 @@ const SCAN_LASTS_S = 0.3;
 // Frames may be ahead of the shown time by the delay of the display [s].
 const AHEAD_S = 0.5;
 
-/**
- * Rear axle [m, rad] and covariance [m^2], n of the estimate.
- *
- * @typedef {{n: number, x: number, y: number, yaw: number, xx: number, xy: number,
- *   yy: number}} ShownEstimate
- */
+/** Rear axle [m, rad] and covariance [m^2], n of the estimate. */
+export interface ShownEstimate {
+  n: number;
+  x: number;
+  y: number;
+  yaw: number;
+  xx: number;
+  xy: number;
+  yy: number;
+}
 
 /** Frames of perception by AV, and the newest map. */
 export class Perceived {
-  /**
-   * {x, y, resolution, rows, columns, bits} of the permanent obstacles, null for none.
-   *
-   * @type {OccupancyFrame|null}
-   */
-  occupancy = null;
-  /** @type {Map<number, SeenFrame>} */
-  #seen = new Map();
-  /** @type {Map<number, SampleRing<EstimateFrame>>} */
-  #estimates = new Map();
-  /** @type {Map<string, ScanFrame>} */
-  #scans = new Map();
+  /** {x, y, resolution, rows, columns, bits} of the permanent obstacles, null for none. */
+  occupancy: OccupancyFrame | null = null;
+  #seen = new Map<number, SeenFrame>();
+  #estimates = new Map<number, SampleRing<EstimateFrame>>();
+  #scans = new Map<string, ScanFrame>();
 
   /**
    * Add a frame of one of these kinds.
    *
-   * @param {PerceptionFrame} frame decoded frame
+   * @param frame decoded frame
    */
-  add(frame) {
+  add(frame: PerceptionFrame) {
     switch (frame.kind) {
       case KIND.SEEN: this.#seen.set(frame.index, frame); break;
       case KIND.SCAN: this.#scans.set(`${frame.index}:${frame.sensor}`, frame); break;
@@ -73,11 +71,11 @@ export class Perceived {
   /**
    * Return the objects that an AV's planner has been told of.
    *
-   * @param {number} av index of the AV
-   * @param {number} t time that is shown [s]
-   * @returns {Float64Array|null} columns: vehicles, then objects; null while unknown
+   * @param av index of the AV
+   * @param t time that is shown [s]
+   * @returns columns: vehicles, then objects; null while unknown
    */
-  seenBy(av, t) {
+  seenBy(av: number, t: number): Float64Array | null {
     const frame = this.#seen.get(av);
     return frame !== undefined && t - frame.t < SEEN_LASTS_S && frame.t - t < AHEAD_S
       ? frame.columns : null;
@@ -86,11 +84,10 @@ export class Perceived {
   /**
    * Return the estimated pose of an AV: the last estimate, extrapolated.
    *
-   * @param {number} av index of the AV
-   * @param {number} t time that is shown [s]
-   * @returns {ShownEstimate|null}
+   * @param av index of the AV
+   * @param t time that is shown [s]
    */
-  estimateOf(av, t) {
+  estimateOf(av: number, t: number): ShownEstimate | null {
     const ring = this.#estimates.get(av);
     const sample = ring?.at(Math.max(ring.indexAt(t + 1e-9), 0));
     if (sample === undefined || Math.abs(t - sample.t) > ESTIMATE_LASTS_S) {
@@ -110,11 +107,10 @@ export class Perceived {
   /**
    * Return the newest scan of each sensor of an AV that is not too old.
    *
-   * @param {number} av index of the AV
-   * @param {number} t time that is shown [s]
-   * @returns {ScanFrame[]}
+   * @param av index of the AV
+   * @param t time that is shown [s]
    */
-  scansOf(av, t) {
+  scansOf(av: number, t: number): ScanFrame[] {
     return [...this.#scans.values()].filter((scan) => scan.index === av
       && t - scan.t < SCAN_PERIODS * scan.period_s + SCAN_LASTS_S && scan.t - t < AHEAD_S);
   }

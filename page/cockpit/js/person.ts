@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The key of this page, by which the server recognises it after a lost connection. */
 
-/** @import { Connection } from './connection.js' */
-/** @import { Store } from './store.js' */
+import type { Connection } from './connection.js';
+import type { Store } from './store.js';
 
 const KEY = 'crgame.key';
 
@@ -16,11 +16,7 @@ class Person {
   #fresh = this.#given === null && sessionStorage.getItem(KEY) === null;
   #key = this.#given ?? sessionStorage.getItem(KEY) ?? localStorage.getItem(KEY) ?? newKey();
 
-  /**
-   * @param {Store} store
-   * @param {Connection} connection
-   */
-  constructor(store, connection) {
+  constructor(store: Store, connection: Connection) {
     this.#connection = connection;
     store.on('hello', () => this.#introduce());
     store.on('you', ({ accepted }) => accepted || this.#beAnother());
@@ -29,8 +25,8 @@ class Person {
     }
   }
 
-  /** @returns {Record<string, string>} headers that identify this page in requests */
-  get headers() {
+  /** @returns headers that identify this page in requests */
+  get headers(): Record<string, string> {
     return { 'X-Crgame-Key': this.#key };
   }
 
@@ -53,8 +49,8 @@ class Person {
   }
 }
 
-/** @returns {string|null} the key in the address, null if there is none */
-function givenKey() {
+/** @returns the key in the address, null if there is none */
+function givenKey(): string | null {
   const key = new URLSearchParams(window.location.search).get('key') ?? '';
   return /^[0-9a-f]{32}$/.test(key) ? key : null;
 }
@@ -68,11 +64,8 @@ function newKey() {
 /**
  * Identify this page to the server at each connection.
  *
- * @param {HTMLElement} _ no part of the page
- * @param {Store} store
- * @param {Connection} connection
- * @returns {Person}
+ * @param _ no part of the page
  */
-export function createPerson(_, store, connection) {
+export function createPerson(_: HTMLElement, store: Store, connection: Connection): Person {
   return new Person(store, connection);
 }

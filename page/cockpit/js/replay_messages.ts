@@ -6,56 +6,57 @@
  * The server's side is crgame_ros/cockpit/replay_backend.py.
  */
 
-/** @import { AlarmsMessage, EventsMessage, Scene, SeatsMessage, SignalsMessage, Status }
- *   from './messages.js' */
+import type {
+  AlarmsMessage, EventsMessage, Scene, SeatsMessage, SignalsMessage, Status,
+} from './messages.js';
 
-export {};
-
-/**
- * A mark on the time line of a recording.
- *
- * @typedef {{t: number, until_t: number, n: number, k: number, kind: string, subject: string,
- *   text: string, count: number}} ReplayMark
- */
+/** A mark on the time line of a recording. */
+export interface ReplayMark {
+  t: number;
+  until_t: number;
+  n: number;
+  k: number;
+  kind: string;
+  subject: string;
+  text: string;
+  count: number;
+}
 
 /**
  * Documents of a recorded run over time: each content with the time [s] from which it is valid.
- *
- * @template Content
- * @typedef {[t: number, content: Content][]} Track
  */
+export type Track<Content> = [t: number, content: Content][];
 
-/**
- * @typedef {object} ReplayTracks
- * @property {Track<Omit<SignalsMessage, 'type'>>} [signals]
- * @property {Track<Omit<EventsMessage, 'type'>>} [events]
- * @property {Track<Omit<SeatsMessage, 'type'>>} [seats]
- * @property {Track<Omit<AlarmsMessage, 'type'>>} [alarms]
- * @property {Track<Status['timing']>} [timing]
- * @property {Track<Status['planners']>} [planners]
- * @property {Track<Status['drivability']>} [drivability]
- * @property {Track<Status['seats_lost']>} [seats_lost]
- * @property {Track<boolean>} [frames_skipped]
- */
+export interface ReplayTracks {
+  signals?: Track<Omit<SignalsMessage, 'type'>>;
+  events?: Track<Omit<EventsMessage, 'type'>>;
+  seats?: Track<Omit<SeatsMessage, 'type'>>;
+  alarms?: Track<Omit<AlarmsMessage, 'type'>>;
+  timing?: Track<Status['timing']>;
+  planners?: Track<Status['planners']>;
+  drivability?: Track<Status['drivability']>;
+  seats_lost?: Track<Status['seats_lost']>;
+  frames_skipped?: Track<boolean>;
+}
 
-/**
- * @typedef {object} ReplayInfo answer of /api/replay/info
- * @property {number} epoch
- * @property {number[]} epochs of the recording
- * @property {string} recording
- * @property {number} start_s
- * @property {number} end_s
- * @property {number} duration_s
- * @property {number} first_n
- * @property {number} last_n
- * @property {number} k0
- * @property {number} dt_s
- * @property {number} steps_per_tick
- * @property {number} chunk_s
- * @property {number} chunks
- * @property {number} real_time_factor
- * @property {ReplayMark[]} events
- * @property {ReplayTracks} documents
- * @property {string[]} notices
- * @property {Scene} scene
- */
+/** Answer of /api/replay/info. */
+export interface ReplayInfo {
+  epoch: number;
+  epochs: number[]; // of the recording
+  recording: string;
+  start_s: number;
+  end_s: number;
+  duration_s: number;
+  first_n: number;
+  last_n: number;
+  k0: number;
+  dt_s: number;
+  steps_per_tick: number;
+  chunk_s: number;
+  chunks: number;
+  real_time_factor: number;
+  events: ReplayMark[];
+  documents: ReplayTracks;
+  notices: string[];
+  scene: Scene;
+}

@@ -2,18 +2,17 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Reasons, in words, why a person may not use a control of this page. */
 
-/** @import { RunAction } from './messages.js' */
-/** @import { Store } from './store.js' */
+import type { RunAction } from './messages.js';
+import type { Store } from './store.js';
 
 /**
  * Return why an action is not allowed here; the server checks it too.
  *
- * @param {Store} store
- * @param {'direct'|'drive'} right that it needs
- * @param {string} deed as in 'reset the run'
- * @returns {string} empty if it may be done
+ * @param right that it needs
+ * @param deed as in 'reset the run'
+ * @returns empty if it may be done
  */
-export function reasonAgainst(store, right, deed) {
+export function reasonAgainst(store: Store, right: 'direct' | 'drive', deed: string): string {
   const { directs, drives, role } = store.rights;
   if (store.mode === 'replay' || role === '' || (right === 'direct' ? directs : drives)) {
     return '';
@@ -24,11 +23,9 @@ export function reasonAgainst(store, right, deed) {
 /**
  * Return why an order is not allowed; a driver in the seat uses start to report ready.
  *
- * @param {Store} store
- * @param {RunAction} action
- * @returns {string} empty if it can
+ * @returns empty if it can
  */
-export function reasonAgainstOrder(store, action) {
+export function reasonAgainstOrder(store: Store, action: RunAction): string {
   const { seats, me, status, rights } = store;
   const seated = Object.values(seats).some(({ holder }) => holder === me.id && me.id !== '');
   if (action === 'start' && seated && status?.n === 0 && rights.drives) {
@@ -40,11 +37,10 @@ export function reasonAgainstOrder(store, action) {
 /**
  * Return why this person cannot act on a seat.
  *
- * @param {Store} store
- * @param {string} id of a seat that there is
- * @returns {string} empty if they can
+ * @param id of a seat that there is
+ * @returns empty if they can
  */
-export function reasonAgainstSeat(store, id) {
+export function reasonAgainstSeat(store: Store, id: string): string {
   const { rights, me, seats: { [id]: seat } } = store;
   const mine = seat.holder === me.id || seat.offer?.client === me.id;
   return reasonAgainst(store, 'drive', 'take a seat')

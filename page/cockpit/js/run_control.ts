@@ -8,22 +8,20 @@ import { icon } from './driving/icons.js';
 import { confirm } from './panels/confirm.js';
 import { reasonAgainst, reasonAgainstOrder } from './rights.js';
 
-/** @import { Connection } from './connection.js' */
-/** @import { Recording, RequestMessage, RunAction, Status } from './messages.js' */
-/** @import { Store } from './store.js' */
+import type { Connection } from './connection.js';
+import type { Recording, RequestMessage, RunAction, Status } from './messages.js';
+import type { Store } from './store.js';
 
 // The states of the run in which an order applies, its key and its text.
-/**
- * @typedef {object} Order
- * @property {string} label
- * @property {string} [key] code of the key on the keyboard
- * @property {string[]} in which states of the run
- * @property {string} title
- * @property {[question: string, consequence: string]} [confirm]
- */
+export interface Order {
+  label: string;
+  key?: string; // code of the key on the keyboard
+  in: string[]; // which states of the run
+  title: string;
+  confirm?: [question: string, consequence: string];
+}
 
-/** @type {Record<RunAction, Order>} */
-const ORDERS = {
+const ORDERS: Record<RunAction, Order> = {
   start: { label: 'Start', key: 'KeyP', in: ['waiting', 'paused'], title: 'Start or go on (P)' },
   pause: { label: 'Pause', key: 'KeyP', in: ['running'],
     title: 'Pause: vehicles, planners and recording stand still (P)' },
@@ -36,10 +34,9 @@ const ORDERS = {
     confirm: ['Stop the run?',
       'It ends for everybody and its recording is closed. It cannot go on afterwards.'] },
 };
-const ACTIONS = /** @type {RunAction[]} */ (Object.keys(ORDERS));
+const ACTIONS = Object.keys(ORDERS) as RunAction[];
 const FACTORS = [0.1, 0.2, 0.25, 0.5, 1, 2, 3, 5, 10];
-/** @type {Record<string, string>} */
-const RUN_TEXTS = {
+const RUN_TEXTS: Record<string, string> = {
   waiting: 'Waiting', running: 'Running', paused: 'Paused', ended: 'Ended',
 };
 
@@ -47,19 +44,14 @@ const RUN_TEXTS = {
 class RunControl {
   #store;
   #connection;
-  #buttons = /** @type {Record<RunAction, HTMLButtonElement>} */ ({});
+  #buttons = {} as Record<RunAction, HTMLButtonElement>;
   #factor = element('select', { 'aria-label': 'Real-time factor',
     title: 'Simulated seconds per second' });
   #root;
   #clock;
   #lamp;
 
-  /**
-   * @param {HTMLElement} root
-   * @param {Store} store
-   * @param {Connection} connection
-   */
-  constructor(root, store, connection) {
+  constructor(root: HTMLElement, store: Store, connection: Connection) {
     this.#store = store;
     this.#connection = connection;
     this.#root = part(root, 'run-control');
@@ -77,8 +69,8 @@ class RunControl {
     this.#root.append(...Object.values(this.#buttons),
       element('label', { class: 'run-factor' }, element('span', { text: 'Speed' }), this.#factor));
     window.addEventListener('keydown', (event) => this.#key(event));
-    for (const name of /** @type {const} */ (['hello', 'you', 'status', 'connection',
-      'seats'])) {
+    for (const name of ['hello', 'you', 'status', 'connection',
+      'seats'] as const) {
       store.on(name, () => this.#show());
     }
     this.#show();
@@ -108,12 +100,8 @@ class RunControl {
     }
   }
 
-  /**
-   * List the usual factors, and the present one if it differs.
-   *
-   * @param {number} present
-   */
-  #offer(present) {
+  /** List the usual factors, and the present one if it differs. */
+  #offer(present: number) {
     const factors = [...new Set([...FACTORS, present])].sort((a, b) => a - b);
     if (factors.length !== this.#factor.options.length
         || !factors.every((f, i) => Number(this.#factor.options[i].value) === f)) {
@@ -131,24 +119,21 @@ class RunControl {
     this.#show();
   }
 
-  /** @param {RunAction} action */
-  async #order(action) {
+  async #order(action: RunAction) {
     const order = ORDERS[action];
     if (!order.confirm || await confirm(...order.confirm, order.label)) {
       await this.#request({ type: 'control', action });
     }
   }
 
-  /** @param {RequestMessage} message */
-  async #request(message) {
+  async #request(message: RequestMessage) {
     const { ok, text } = await this.#connection.request(message);
     if (!ok) {
       this.#store.receive({ type: 'notice', level: 'warn', text });
     }
   }
 
-  /** @param {KeyboardEvent} event */
-  #key(event) {
+  #key(event: KeyboardEvent) {
     if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)
         || document.querySelector('dialog[open]') || this.#root.hidden
         // A driver may press a key by mistake; only a director controls the experiment.
@@ -164,8 +149,7 @@ class RunControl {
   }
 }
 
-/** @param {HTMLElement} node */
-function buildClock(node) {
+function buildClock(node: HTMLElement) {
   const time = element('span', { class: 'clock-time', text: '–' });
   const step = element('span', { class: 'clock-step' });
   const factor = element('span', { class: 'clock-factor', title: 'Measured real-time factor' });
@@ -173,11 +157,7 @@ function buildClock(node) {
   node.replaceChildren(time, element('span', { class: 'clock-small' }, step, factor), state);
   return {
     node,
-    /**
-     * @param {Status} status
-     * @param {boolean} connected
-     */
-    show({ t, k, measured_factor, run }, connected) {
+    show({ t, k, measured_factor, run }: Status, connected: boolean) {
       setText(time, Number.isFinite(t) ? `${t.toFixed(1)} s` : '–');
       setText(step, `k ${k ?? '–'}`);
       setText(factor, run === 'running' && Number.isFinite(measured_factor)
@@ -189,14 +169,12 @@ function buildClock(node) {
   };
 }
 
-/** @param {HTMLElement} node */
-function buildLamp(node) {
+function buildLamp(node: HTMLElement) {
   const text = element('span', { class: 'lamp-text' });
   node.replaceChildren(element('span', { class: 'lamp', 'aria-hidden': 'true' }), text);
   return {
     node,
-    /** @param {Recording} recording */
-    show({ state, megabytes, text: reason }) {
+    show({ state, megabytes, text: reason }: Recording) {
       setAttribute(node, 'data-state', state);
       const size = megabytes === undefined || !Number.isFinite(megabytes) ? ''
         : ` ${megabytes.toFixed(1)} MB`;
@@ -209,14 +187,8 @@ function buildLamp(node) {
   };
 }
 
-/**
- * Return the state of the recording, unknown without a connection unless the run was over.
- *
- * @param {Status} status
- * @param {boolean} connected
- * @returns {Recording}
- */
-function recordingNow({ recording, run }, connected) {
+/** Return the state of the recording, unknown without a connection unless the run was over. */
+function recordingNow({ recording, run }: Status, connected: boolean): Recording {
   const told = recording ?? { state: 'none' };
   if (connected) {
     return told;
@@ -228,11 +200,9 @@ function recordingNow({ recording, run }, connected) {
 /**
  * Put the run control, the clock and the recording lamp into the header.
  *
- * @param {HTMLElement} root the header
- * @param {Store} store
- * @param {Connection} connection
- * @returns {RunControl}
+ * @param root the header
  */
-export function createRunControl(root, store, connection) {
+export function createRunControl(root: HTMLElement, store: Store,
+  connection: Connection): RunControl {
   return new RunControl(root, store, connection);
 }

@@ -4,23 +4,18 @@
 
 import { countWhile } from './search.js';
 
-/**
- * Samples {n, t, …}, oldest first; a new one beyond the capacity replaces the oldest.
- *
- * @template {{n: number, t: number}} Sample
- */
-export class SampleRing {
-  /** @type {(Sample|undefined)[]} */
-  #items;
+/** Samples {n, t, …}, oldest first; a new one beyond the capacity replaces the oldest. */
+export class SampleRing<Sample extends { n: number; t: number }> {
+  #items: (Sample | undefined)[];
   #start = 0;
   #length = 0;
   #spacing_s;
 
   /**
-   * @param {number} capacity how many samples are kept
-   * @param {number} [spacing_s] samples that follow within this time are left out [s]
+   * @param capacity how many samples are kept
+   * @param spacing_s samples that follow within this time are left out [s]
    */
-  constructor(capacity, spacing_s = 0) {
+  constructor(capacity: number, spacing_s = 0) {
     this.#items = new Array(capacity);
     this.#spacing_s = spacing_s;
   }
@@ -36,10 +31,10 @@ export class SampleRing {
   }
 
   /**
-   * @param {number} index 0 is the oldest
-   * @returns {Sample|undefined} the sample
+   * @param index 0 is the oldest
+   * @returns the sample
    */
-  at(index) {
+  at(index: number): Sample | undefined {
     return index < 0 || index >= this.#length ? undefined
       : this.#items[(this.#start + index) % this.#items.length];
   }
@@ -47,10 +42,10 @@ export class SampleRing {
   /**
    * Add a sample; one of the newest sample's step replaces it.
    *
-   * @param {Sample} sample with n and t
-   * @returns {boolean} false for a sample that is too old or too close
+   * @param sample with n and t
+   * @returns false for a sample that is too old or too close
    */
-  push(sample) {
+  push(sample: Sample): boolean {
     const newest = this.newest;
     if (newest !== undefined) {
       if (sample.n === newest.n) {
@@ -80,10 +75,10 @@ export class SampleRing {
   /**
    * Find the last sample at or before a time.
    *
-   * @param {number} t simulation time [s]
-   * @returns {number} its index, -1 when all are later
+   * @param t simulation time [s]
+   * @returns its index, -1 when all are later
    */
-  indexAt(t) {
+  indexAt(t: number): number {
     return countWhile(this.#length, (index) => this.#kept(index).t <= t) - 1;
   }
 
@@ -92,11 +87,8 @@ export class SampleRing {
     return Array.from({ length: this.#length }, (_, index) => this.#kept(index));
   }
 
-  /**
-   * @param {number} index of a sample that is there
-   * @returns {Sample}
-   */
-  #kept(index) {
-    return /** @type {Sample} */ (this.at(index));
+  /** @param index of a sample that is there */
+  #kept(index: number): Sample {
+    return this.at(index) as Sample;
   }
 }

@@ -5,11 +5,11 @@
 /**
  * Count the items at the beginning of an ordered list that satisfy a condition.
  *
- * @param {number} length of the list
- * @param {(index: number) => boolean} holds true up to some place and false from there on
- * @returns {number} index of the first item for which it is false
+ * @param length of the list
+ * @param holds true up to some place and false from there on
+ * @returns index of the first item for which it is false
  */
-export function countWhile(length, holds) {
+export function countWhile(length: number, holds: (index: number) => boolean): number {
   let low = 0;
   let high = length;
   while (low < high) {

@@ -7,30 +7,28 @@ import { NameField } from './driving/name_field.js';
 import { describeSeat } from './driving/seat_text.js';
 import { reasonAgainstSeat } from './rights.js';
 
-/** @import { Connection } from './connection.js' */
-/** @import { Driving } from './driving/driving.js' */
-/** @import { Person, Reply, RequestMessage, SceneVehicle, Seat } from './messages.js' */
-/** @import { Store } from './store.js' */
+import type { Connection } from './connection.js';
+import type { Driving } from './driving/driving.js';
+import type { Person, Reply, RequestMessage, SceneVehicle, Seat } from './messages.js';
+import type { Store } from './store.js';
 
-/**
- * The facts of a row of the list.
- *
- * @typedef {object} Facts
- * @property {string} id
- * @property {SceneVehicle['role']} role
- * @property {boolean} connected
- * @property {boolean} mine
- * @property {string|null} holder
- * @property {boolean} left
- * @property {Person[]} requests
- * @property {Person[]} others
- * @property {boolean} asked
- * @property {Person|null} offer
- * @property {boolean} offered to this person
- * @property {string} refused why this person cannot take a seat
- * @property {string} text
- * @property {boolean} lost
- */
+/** The facts of a row of the list. */
+export interface Facts {
+  id: string;
+  role: SceneVehicle['role'];
+  connected: boolean;
+  mine: boolean;
+  holder: string | null;
+  left: boolean;
+  requests: Person[];
+  others: Person[];
+  asked: boolean;
+  offer: Person | null;
+  offered: boolean; // to this person
+  refused: string; // why this person cannot take a seat
+  text: string;
+  lost: boolean;
+}
 
 /** The list of seats, with the name field above and the input devices below. */
 class Seats {
@@ -40,20 +38,13 @@ class Seats {
   #list = element('ul', { class: 'seats' });
   #news = element('p', { class: 'drive-news', role: 'status', 'aria-live': 'polite' });
   #shown = '';
-  /** @type {Record<string, Seat>} */
-  #before = {};
+  #before: Record<string, Seat> = {};
   // After a broken connection, the seats stay as they were until new ones arrive.
   #stale = false;
   #live;
   #replay;
 
-  /**
-   * @param {HTMLElement} root
-   * @param {Store} store
-   * @param {Connection} connection
-   * @param {Driving} driving
-   */
-  constructor(root, store, connection, driving) {
+  constructor(root: HTMLElement, store: Store, connection: Connection, driving: Driving) {
     this.#store = store;
     this.#connection = connection;
     this.#driving = driving;
@@ -69,7 +60,7 @@ class Seats {
       this.#stale = false;
       this.#show();
     });
-    for (const event of /** @type {const} */ (['hello', 'you', 'scene', 'status'])) {
+    for (const event of ['hello', 'you', 'scene', 'status'] as const) {
       store.on(event, () => this.#show());
     }
     store.on('connection', (connected) => connected || this.#disconnected());
@@ -102,11 +93,7 @@ class Seats {
       ...known.filter((id) => !inScene.includes(id))];
   }
 
-  /**
-   * @param {string} id
-   * @returns {Facts}
-   */
-  #facts(id) {
+  #facts(id: string): Facts {
     const { seats, scene, me, status } = this.#store;
     const connected = this.#store.connected && !this.#stale;
     const seat = seats[id];
@@ -128,11 +115,7 @@ class Seats {
     };
   }
 
-  /**
-   * @param {Facts[]} rows
-   * @param {string} none
-   */
-  #rebuild(rows, none) {
+  #rebuild(rows: Facts[], none: string) {
     const focused = document.activeElement instanceof HTMLElement
       ? document.activeElement.dataset.key : undefined;
     this.#list.replaceChildren(...rows.map((facts) => this.#row(facts)));
@@ -140,14 +123,11 @@ class Seats {
       this.#list.append(element('li', { class: 'drive-note', text: none }));
     }
     if (focused) {
-      /** @type {HTMLElement|null} */
-      const again = this.#list.querySelector(`[data-key="${CSS.escape(focused)}"]`);
-      again?.focus();
+      this.#list.querySelector<HTMLElement>(`[data-key="${CSS.escape(focused)}"]`)?.focus();
     }
   }
 
-  /** @param {Facts} facts */
-  #row(facts) {
+  #row(facts: Facts) {
     const { id, role, mine, lost, text } = facts;
     return element('li', { class: 'seat', 'data-seat': id, 'data-role': role, 'data-mine': mine,
       'data-lost': lost },
@@ -162,18 +142,10 @@ class Seats {
     element('div', { class: 'seat-buttons' }, ...this.#buttons(facts)));
   }
 
-  /** @param {Facts} facts */
-  #buttons(facts) {
+  #buttons(facts: Facts) {
     const { id, role, mine, holder, left, requests, others, asked, connected, refused } = facts;
-    /**
-     * @param {string} action
-     * @param {string} text
-     * @param {() => Promise<Reply>} act
-     * @param {string} title
-     * @param {boolean} [enabled]
-     * @returns {HTMLElement}
-     */
-    const button = (action, text, act, title, enabled = connected) => element('button', {
+    const button = (action: string, text: string, act: () => Promise<Reply>, title: string,
+      enabled = connected): HTMLElement => element('button', {
       type: 'button', text, title: refused || title,
       class: `drive-button ${['claim', 'accept'].includes(action) ? 'primary' : ''}`,
       'data-action': action, 'data-key': `${id} ${text}`, disabled: !enabled || refused !== '',
@@ -213,14 +185,8 @@ class Seats {
     return left ? [claim, giveBack] : [claim];
   }
 
-  /**
-   * Return a selection of the persons that have not asked for the seat.
-   *
-   * @param {string} id
-   * @param {Person[]} others
-   * @param {boolean} connected
-   */
-  #handOver(id, others, connected) {
+  /** Return a selection of the persons that have not asked for the seat. */
+  #handOver(id: string, others: Person[], connected: boolean) {
     const choice = element('select', { class: 'seat-hand-over', disabled: !connected,
       'aria-label': `Hand ${id} over to`, 'data-key': `${id} hand over`,
       on: { change: () => this.#report(
@@ -230,19 +196,16 @@ class Seats {
     return choice;
   }
 
-  /** @param {string} id */
-  #giveBack(id) {
+  #giveBack(id: string) {
     return this.#driving.seat === id ? this.#driving.release()
       : this.#request({ type: 'release', seat: id });
   }
 
-  /** @param {RequestMessage} message */
-  #request(message) {
+  #request(message: RequestMessage) {
     return this.#connection.request(message);
   }
 
-  /** @param {Promise<Reply>} reply */
-  async #report(reply) {
+  async #report(reply: Promise<Reply>) {
     const { ok, text } = await reply;
     if (!ok) {
       this.#store.receive({ type: 'notice', level: 'warn', text });
@@ -262,12 +225,8 @@ class Seats {
     this.#show();
   }
 
-  /**
-   * Show what changed for this person since the last document.
-   *
-   * @param {Record<string, Seat>} seats
-   */
-  #announce(seats) {
+  /** Show what changed for this person since the last document. */
+  #announce(seats: Record<string, Seat>) {
     const { me } = this.#store;
     for (const [id, seat] of Object.entries(seats)) {
       const before = this.#before[id];
@@ -291,12 +250,9 @@ class Seats {
 /**
  * Put the seats into the Drive panel.
  *
- * @param {HTMLElement} root the panel
- * @param {Store} store
- * @param {Connection} connection
- * @param {Driving} driving
- * @returns {Seats}
+ * @param root the panel
  */
-export function createSeats(root, store, connection, driving) {
+export function createSeats(root: HTMLElement, store: Store, connection: Connection,
+  driving: Driving): Seats {
   return new Seats(root, store, connection, driving);
 }

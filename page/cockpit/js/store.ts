@@ -10,16 +10,19 @@ import { extrapolateVehicles, interpolateVehicles, moveObjects } from './interpo
 import { Perceived } from './perceived.js';
 import { SampleRing } from './samples.js';
 
-/** @import { ObjectsFrame, PerceptionFrame, PlanFrame, PredictionFrame } from './frames.js' */
-/** @import { CriticalityFrame, StateFrame } from './frames.js' */
-/** @import { History } from './history.js' */
-/** @import { Alarm, AlarmsMessage, EventsMessage, FilesMessage } from './messages.js' */
-/** @import { Exposure, FiredEvent, HelloMessage, Measure, NoticeMessage } from './messages.js' */
-/** @import { Scene, SceneMessage, Seat, SeatsMessage, SignalsMessage } from './messages.js' */
-/** @import { DeviceDelay, PeopleMessage, Present, Rights } from './people_messages.js' */
-/** @import { YouMessage } from './people_messages.js' */
-/** @import { Status, StatusMessage, StoreMessage } from './messages.js' */
-/** @import { TasksMessage } from './tasks/task_messages.js' */
+import type {
+  CriticalityFrame, ObjectsFrame, PerceptionFrame, PlanFrame, PredictionFrame, StateFrame,
+} from './frames.js';
+import type { History } from './history.js';
+import type {
+  Alarm, AlarmsMessage, EventsMessage, Exposure, FilesMessage, FiredEvent, HelloMessage, Measure,
+  NoticeMessage, Scene, SceneMessage, Seat, SeatsMessage, SignalsMessage, Status, StatusMessage,
+  StoreMessage,
+} from './messages.js';
+import type {
+  DeviceDelay, PeopleMessage, Present, Rights, YouMessage,
+} from './people_messages.js';
+import type { TasksMessage } from './tasks/task_messages.js';
 
 // Samples for a replay of the last 10 s: states at 100 Hz, and scenario steps at up to 25 Hz.
 const RAW_SAMPLES = 1020;
@@ -29,67 +32,58 @@ const HISTORY_S = 120;
 // How long an object whose next step is late is extrapolated beyond it [s].
 const LATE_S = 0.1;
 
-/**
- * The shown state at a time: the rows of all vehicles and objects.
- *
- * @typedef {{t: number, n: number, k: number, epoch: number, vehicles: Float64Array,
- *   objects: Float64Array}} Shown
- * @typedef {(index: number, seconds: number) => History} HistorySource
- */
+// The shown state at a time: the rows of all vehicles and objects.
+export interface Shown {
+  t: number;
+  n: number;
+  k: number;
+  epoch: number;
+  vehicles: Float64Array;
+  objects: Float64Array;
+}
 
-/**
- * The content that a listener gets, by event.
- *
- * @typedef {object} StoreEvents
- * @property {HelloMessage} hello
- * @property {SceneMessage} scene
- * @property {SeatsMessage} seats
- * @property {SignalsMessage} signals
- * @property {EventsMessage} events
- * @property {TasksMessage} tasks
- * @property {StatusMessage} status
- * @property {AlarmsMessage} alarms
- * @property {FilesMessage} files
- * @property {NoticeMessage} notice
- * @property {YouMessage} you
- * @property {PeopleMessage} people
- * @property {boolean} connection whether there is one
- * @property {StateFrame} state
- * @property {ObjectsFrame} objects
- * @property {PlanFrame} plan
- * @property {PredictionFrame} prediction
- * @property {PerceptionFrame} perception
- * @property {CriticalityFrame} criticality
- * @property {number} epoch
- */
+export type HistorySource = (index: number, seconds: number) => History;
+
+/** The content that a listener gets, by event. */
+export interface StoreEvents {
+  hello: HelloMessage;
+  scene: SceneMessage;
+  seats: SeatsMessage;
+  signals: SignalsMessage;
+  events: EventsMessage;
+  tasks: TasksMessage;
+  status: StatusMessage;
+  alarms: AlarmsMessage;
+  files: FilesMessage;
+  notice: NoticeMessage;
+  you: YouMessage;
+  people: PeopleMessage;
+  connection: boolean; // whether there is one
+  state: StateFrame;
+  objects: ObjectsFrame;
+  plan: PlanFrame;
+  prediction: PredictionFrame;
+  perception: PerceptionFrame;
+  criticality: CriticalityFrame;
+  epoch: number;
+}
 
 /** The page's data; see `on` for the events by which parts learn of changes. */
 export class Store {
   // Latest documents of the server; null or empty before the first.
-  /** @type {Scene|null} */
-  scene = null;
-  /** @type {Record<string, Seat>} */
-  seats = {};
-  /** @type {Omit<SignalsMessage, 'type'>} */
-  signals = { k: 0, states: {}, objects: {} };
-  /** @type {FiredEvent[]} */
-  fired = [];
-  /** @type {Omit<TasksMessage, 'type'>} */
-  tasks = { running: [], open: [] };
-  /** @type {Status|null} */
-  status = null;
-  /** @type {Alarm[]} */
-  alarms = [];
+  scene: Scene | null = null;
+  seats: Record<string, Seat> = {};
+  signals: Omit<SignalsMessage, 'type'> = { k: 0, states: {}, objects: {} };
+  fired: FiredEvent[] = [];
+  tasks: Omit<TasksMessage, 'type'> = { running: [], open: [] };
+  status: Status | null = null;
+  alarms: Alarm[] = [];
   me = { id: '', name: '' };
-  /** @type {Present[]} */
-  people = [];
-  /** @type {DeviceDelay[]} */
-  devices = [];
-  /** @type {Rights} */
-  rights = { role: '', directs: false, drives: false, seat: '', may_direct: false,
+  people: Present[] = [];
+  devices: DeviceDelay[] = [];
+  rights: Rights = { role: '', directs: false, drives: false, seat: '', may_direct: false,
     may_drive: false };
-  /** @type {HelloMessage['mode']|null} */
-  mode = null;
+  mode: HelloMessage['mode'] | null = null;
   version = '';
   /** Origin of the one page that may frame this one; empty for none. */
   framedBy = '';
@@ -98,52 +92,41 @@ export class Store {
 
   /** Counts resets; -1 before the first frame. */
   epoch = -1;
-  /** @type {Map<number, PlanFrame>} the newest plan by vehicle's index */
-  plans = new Map();
-  /** @type {Map<number, PredictionFrame>} the newest predictions by index of the asking AV */
-  predictions = new Map();
+  plans = new Map<number, PlanFrame>(); // the newest plan by vehicle's index
+  /** The newest predictions by index of the asking AV. */
+  predictions = new Map<number, PredictionFrame>();
   /** The perception of AVs, and the map of permanent obstacles. */
   perceived = new Perceived();
-  /** @type {Measure[]} of criticality, as the server has greeted with */
-  measures = [];
-  /** @type {Exposure[]} likewise */
-  exposures = [];
+  measures: Measure[] = []; // of criticality, as the server has greeted with
+  exposures: Exposure[] = []; // likewise
   /** The criticality of the vehicles; of a replay, over the whole run. */
   criticality = new CriticalityLog(() => this.measures, HISTORY_S);
   // Received raw samples, a few seconds: states and scenario steps.
-  /** @type {SampleRing<StateFrame>} */
-  samples = new SampleRing(RAW_SAMPLES);
-  /** @type {SampleRing<ObjectsFrame>} */
-  steps = new SampleRing(RAW_STEPS);
+  samples = new SampleRing<StateFrame>(RAW_SAMPLES);
+  steps = new SampleRing<ObjectsFrame>(RAW_STEPS);
   clock = new DisplayClock();
 
   // True from each hello to the first state: it may be another simulation with new epochs.
   #fresh = true;
   // Each set holds the listeners of one event; StoreEvents describes their content.
-  /** @type {Map<string, Set<(content: any) => void>>} */
-  #listeners = new Map();
-  /** @type {SampleRing<StateFrame>} */
-  #history = new SampleRing(HISTORY_S / HISTORY_SPACING_S, HISTORY_SPACING_S);
-  /** @type {Shown} */
-  #shown = {
+  #listeners = new Map<string, Set<(content: never) => void>>();
+  #history = new SampleRing<StateFrame>(HISTORY_S / HISTORY_SPACING_S, HISTORY_SPACING_S);
+  #shown: Shown = {
     t: 0, n: 0, k: 0, epoch: -1, vehicles: new Float64Array(0), objects: new Float64Array(0),
   };
   #shownFor_ms = NaN;
-  /** @type {((now_ms: number) => number)|null} */
-  #timeSource = null;
-  /** @type {HistorySource|null} */
-  #historySource = null;
+  #timeSource: ((now_ms: number) => number) | null = null;
+  #historySource: HistorySource | null = null;
 
   /**
    * Listen to an event.
    *
-   * @template {keyof StoreEvents} Name
-   * @param {Name} name of the event
-   * @param {(content: StoreEvents[Name]) => void} listener called after the store has stored the
-   *   content
-   * @returns {() => void} ends it
+   * @param name of the event
+   * @param listener called after the store has stored the content
+   * @returns ends it
    */
-  on(name, listener) {
+  on<Name extends keyof StoreEvents>(name: Name,
+    listener: (content: StoreEvents[Name]) => void): () => void {
     const listeners = this.#listeners.get(name) ?? new Set();
     this.#listeners.set(name, listeners.add(listener));
     return () => listeners.delete(listener);
@@ -152,9 +135,9 @@ export class Store {
   /**
    * Store a document or an event of the server.
    *
-   * @param {StoreMessage} message with its `type`
+   * @param message with its `type`
    */
-  receive(message) {
+  receive(message: StoreMessage) {
     switch (message.type) {
       case 'hello':
         this.me = { id: message.client, name: message.name };
@@ -197,10 +180,10 @@ export class Store {
   /**
    * Store a binary frame; one of an earlier epoch is dropped.
    *
-   * @param {ArrayBuffer} buffer the frame
-   * @param {number} now_ms when it arrived
+   * @param buffer the frame
+   * @param now_ms when it arrived
    */
-  receiveFrame(buffer, now_ms) {
+  receiveFrame(buffer: ArrayBuffer, now_ms: number) {
     const frame = decodeFrame(buffer);
     if (frame === null || (frame.epoch < this.epoch && !this.#fresh)) {
       return;
@@ -232,9 +215,9 @@ export class Store {
   /**
    * Remove all samples, for a reset or a jump of a replay.
    *
-   * @param {number} epoch of the frames to come
+   * @param epoch of the frames to come
    */
-  restart(epoch) {
+  restart(epoch: number) {
     this.epoch = epoch;
     this.samples.clear();
     this.steps.clear();
@@ -250,8 +233,8 @@ export class Store {
     this.#emit('epoch', epoch);
   }
 
-  /** @param {boolean} connected whether the server can be reached */
-  setConnected(connected) {
+  /** @param connected whether the server can be reached */
+  setConnected(connected: boolean) {
     this.connected = connected;
     this.clock.reset();
     this.#emit('connection', connected);
@@ -260,9 +243,9 @@ export class Store {
   /**
    * Show the times of a function instead of those of the live clock.
    *
-   * @param {((now_ms: number) => number)|null} source wall time [ms] -> simulation time [s]
+   * @param source wall time [ms] -> simulation time [s]
    */
-  useTimeSource(source) {
+  useTimeSource(source: ((now_ms: number) => number) | null) {
     this.#timeSource = source;
     this.#shownFor_ms = NaN;
   }
@@ -270,9 +253,9 @@ export class Store {
   /**
    * Get the past of vehicles from a function instead of the received samples.
    *
-   * @param {HistorySource|null} source as `history`
+   * @param source as `history`
    */
-  useHistorySource(source) {
+  useHistorySource(source: HistorySource | null) {
     this.#historySource = source;
   }
 
@@ -287,10 +270,10 @@ export class Store {
    * Vehicles are interpolated linearly in t between the samples around t, or extrapolated from the
    * newest if it is late; objects are at pose + velocity * (t - t of their step).
    *
-   * @param {number} now_ms the frame's time, as requestAnimationFrame gives it
-   * @returns {Shown|null} the same object each time, refilled; null before any sample
+   * @param now_ms the frame's time, as requestAnimationFrame gives it
+   * @returns the same object each time, refilled; null before any sample
    */
-  displayed(now_ms) {
+  displayed(now_ms: number): Shown | null {
     const newest = this.samples.newest;
     if (newest === undefined) {
       return null;
@@ -312,11 +295,10 @@ export class Store {
   /**
    * Return a vehicle's past for plots.
    *
-   * @param {number} index of the vehicle in the scene
-   * @param {number} seconds how far back, at most 120 s
-   * @returns {History}
+   * @param index of the vehicle in the scene
+   * @param seconds how far back, at most 120 s
    */
-  history(index, seconds) {
+  history(index: number, seconds: number): History {
     if (this.#historySource !== null) {
       return this.#historySource(index, seconds);
     }
@@ -330,18 +312,14 @@ export class Store {
   }
 
   /**
-   * @param {string} id of a vehicle
-   * @returns {number} its index in the scene and in STATE, -1 when there is none
+   * @param id of a vehicle
+   * @returns its index in the scene and in STATE, -1 when there is none
    */
-  vehicleIndex(id) {
+  vehicleIndex(id: string): number {
     return this.scene === null ? -1 : this.scene.vehicles.findIndex((v) => v.id === id);
   }
 
-  /**
-   * @param {StateFrame} frame
-   * @param {number} now_ms
-   */
-  #receiveState(frame, now_ms) {
+  #receiveState(frame: StateFrame, now_ms: number) {
     if ((this.samples.newest?.vehicles.length ?? frame.vehicles.length)
         !== frame.vehicles.length) {
       this.samples.clear();
@@ -355,11 +333,10 @@ export class Store {
     this.#emit('state', frame);
   }
 
-  /** @param {Shown} shown */
-  #fillVehicles(shown) {
+  #fillVehicles(shown: Shown) {
     const index = Math.max(this.samples.indexAt(shown.t), 0);
     // There is a sample: nothing is displayed before the first.
-    const before = /** @type {StateFrame} */ (this.samples.at(index));
+    const before = this.samples.at(index) as StateFrame;
     const after = this.samples.at(index + 1);
     if (shown.vehicles.length !== before.vehicles.length) {
       shown.vehicles = new Float64Array(before.vehicles.length);
@@ -374,8 +351,7 @@ export class Store {
     }
   }
 
-  /** @param {Shown} shown */
-  #fillObjects(shown) {
+  #fillObjects(shown: Shown) {
     const step = this.steps.at(Math.max(this.steps.indexAt(shown.t), 0));
     const size = step?.objects.length ?? 0;
     if (shown.objects.length !== size) {
@@ -388,13 +364,9 @@ export class Store {
     }
   }
 
-  /**
-   * @param {keyof StoreEvents} name
-   * @param {StoreEvents[keyof StoreEvents]} content
-   */
-  #emit(name, content) {
+  #emit(name: keyof StoreEvents, content: StoreEvents[keyof StoreEvents]) {
     for (const listener of this.#listeners.get(name) ?? []) {
-      listener(content);
+      listener(content as never);
     }
   }
 }

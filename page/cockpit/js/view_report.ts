@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The report of this page's view to the server, which records the views of drivers. */
 
-/** @import { Connection } from './connection.js' */
-/** @import { ViewMessage } from './messages.js' */
-/** @import { Store } from './store.js' */
+import type { Connection } from './connection.js';
+import type { ViewMessage } from './messages.js';
+import type { Store } from './store.js';
 
 const CHECK_EVERY_MS = 100;
 // The picture rate is reported once a second [ms].
@@ -20,12 +20,8 @@ class ViewReport {
   #sent_ms = -Infinity;
   #pictures = 0;
 
-  /**
-   * @param {HTMLElement} stage that holds the picture
-   * @param {Store} store
-   * @param {Connection} connection
-   */
-  constructor(stage, store, connection) {
+  /** @param stage that holds the picture */
+  constructor(stage: HTMLElement, store: Store, connection: Connection) {
     this.#stage = stage;
     this.#store = store;
     this.#connection = connection;
@@ -53,8 +49,8 @@ class ViewReport {
     }
   }
 
-  /** @returns {Omit<ViewMessage, 'ratio'|'rate_hz'>} the settings that only the user changes */
-  get #choice() {
+  /** @returns the settings that only the user changes */
+  get #choice(): Omit<ViewMessage, 'ratio' | 'rate_hz'> {
     const { view3d, world, stage } = window.crgame;
     const { clientWidth: width_px, clientHeight: height_px } = this.#stage;
     const rest = { width_px, height_px, bare: Number(stage !== undefined) };
@@ -93,11 +89,9 @@ class ViewReport {
 /**
  * Report this page's view to the server.
  *
- * @param {HTMLElement} root the stage, which holds the picture
- * @param {Store} store
- * @param {Connection} connection
- * @returns {ViewReport}
+ * @param root the stage, which holds the picture
  */
-export function createViewReport(root, store, connection) {
+export function createViewReport(root: HTMLElement, store: Store,
+  connection: Connection): ViewReport {
   return new ViewReport(root, store, connection);
 }

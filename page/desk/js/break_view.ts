@@ -5,18 +5,12 @@
 import { element, setAttribute, setText } from '../../cockpit/js/dom.js';
 import { button } from './page_view.js';
 
-/** @import { BreakDocument } from './desk_messages.js' */
-/** @import { Words } from './words.js' */
+import type { BreakDocument } from './desk_messages.js';
+import type { Words } from './words.js';
 
-/**
- * Build the view.
- *
- * @param {BreakDocument} shown
- * @param {Words} words
- * @param {() => void} finish
- * @returns {HTMLElement}
- */
-export function breakView({ text, left_s }, words, finish) {
+/** Build the view. */
+export function breakView({ text, left_s }: BreakDocument, words: Words,
+  finish: () => void): HTMLElement {
   const over_ms = performance.now() + 1000 * left_s;
   const left = element('p', { class: 'left', role: 'timer' });
   const told = element('p', { role: 'status' });
@@ -42,9 +36,9 @@ export function breakView({ text, left_s }, words, finish) {
 }
 
 /**
- * @param {number} time_s whole seconds
- * @returns {string} minutes:seconds
+ * @param time_s whole seconds
+ * @returns minutes:seconds
  */
-export function clockTime(time_s) {
+export function clockTime(time_s: number): string {
   return `${Math.floor(time_s / 60)}:${String(time_s % 60).padStart(2, '0')}`;
 }

@@ -2,25 +2,27 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The WebSocket to the desk's server: it reconnects and estimates the server's clock. */
 
-/** @import { ExperimenterMessage, ParticipantMessage, Ping } from './page_messages.js' */
+import type { PongMessage } from './desk_messages.js';
+import type { ExperimenterMessage, ParticipantMessage, Ping } from './page_messages.js';
 
 const FIRST_RETRY_MS = 250;
 const LAST_RETRY_MS = 2000;
 const PING_EVERY_MS = 1000;
 const LONGEST_TOLD_MS = 60_000;
 
-/**
- * @typedef {{opened: (again: boolean) => void, lost: () => void,
- *   received: (message: any) => void, pinged?: () => Partial<Ping>}} Listener
- *   `pinged` returns the data to send with each ping
- */
+/** `pinged` returns the data to send with each ping. */
+export interface Listener<Message> {
+  opened: (again: boolean) => void;
+  lost: () => void;
+  received: (message: Message) => void;
+  pinged?: () => Partial<Ping>;
+}
 
-/** One page's connection. */
-export class DeskConnection {
+/** One page's connection, on which it gets its own kinds of messages, and pongs. */
+export class DeskConnection<Message extends { type: string }> {
   #listener;
   #url;
-  /** @type {WebSocket|null} */
-  #socket = null;
+  #socket: WebSocket | null = null;
   #retry_ms = FIRST_RETRY_MS;
   #opened = false;
   #offset_s = 0;
@@ -28,11 +30,8 @@ export class DeskConnection {
   /** The round-trip time [ms]; NaN before it is known. */
   round_trip_ms = NaN;
 
-  /**
-   * @param {string} path of the WebSocket
-   * @param {Listener} listener
-   */
-  constructor(path, listener) {
+  /** @param path of the WebSocket */
+  constructor(path: string, listener: Listener<Message>) {
     this.#listener = listener;
     const url = new URL(path, window.location.href);
     url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
@@ -46,11 +45,8 @@ export class DeskConnection {
     return (performance.timeOrigin + performance.now()) / 1000 + this.#offset_s;
   }
 
-  /**
-   * @param {ParticipantMessage|ExperimenterMessage} message
-   * @returns {boolean} false when there is no connection
-   */
-  send(message) {
+  /** @returns false when there is no connection */
+  send(message: ParticipantMessage | ExperimenterMessage): boolean {
     if (this.#socket?.readyState !== WebSocket.OPEN) {
       return false;
     }
@@ -83,19 +79,18 @@ export class DeskConnection {
       ? { round_trip_ms: Math.min(round_trip_ms, LONGEST_TOLD_MS) } : {} });
   }
 
-  /** @param {any} message */
-  #receive(message) {
+  #receive(message: Message | PongMessage) {
     if (message.type !== 'pong') {
-      this.#listener.received(message);
+      this.#listener.received(message as Message);
       return;
     }
+    const { t, at } = message as PongMessage;
     const now_ms = performance.now();
-    this.round_trip_ms = now_ms - message.t;
+    this.round_trip_ms = now_ms - t;
     // The shortest round trip gives the best estimate of the other clock.
     if (this.round_trip_ms <= this.#best_ms) {
       this.#best_ms = this.round_trip_ms;
-      this.#offset_s = message.at
-        - (performance.timeOrigin + (now_ms + message.t) / 2) / 1000;
+      this.#offset_s = at - (performance.timeOrigin + (now_ms + t) / 2) / 1000;
     }
   }
 }

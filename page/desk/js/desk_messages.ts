@@ -1,49 +1,101 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/**
- * The messages between the participant's page and the desk's server.
- *
- * @typedef {number|string|string[]|null} Answer
- *
- * @typedef {{name: string, ask: string, required: boolean}} Asked
- * @typedef {Asked & {kind: 'likert', points: number, left: string, right: string,
- *   labels: string[]}} LikertQuestion
- * @typedef {Asked & {kind: 'slider', low: number, high: number, step: number, left: string,
- *   right: string}} SliderQuestion
- * @typedef {Asked & {kind: 'choice', several: boolean,
- *   choices: [name: string, text: string][]}} ChoiceQuestion
- * @typedef {Asked & {kind: 'number', low: number, high: number, whole: boolean,
- *   unit: string}} NumberQuestion
- * @typedef {Asked & {kind: 'text', longest: number}} TextQuestion
- * @typedef {LikertQuestion|SliderQuestion|ChoiceQuestion|NumberQuestion|TextQuestion} Question
- *
- * @typedef {string|{tag: string, children?: PageNode[], href?: string, src?: string,
- *   alt?: string}} PageNode  an element of a Markdown page
- *
- * @typedef {{done: number, of: number, drives_done: number, drives: number}} Progress
- * @typedef {{type: 'desk', study: string, participant: string, language: string,
- *   languages: string[], item: string, again: number,
- *   progress?: Progress}} Always  `again` is the number of repeats of the item
- * @typedef {Always & {show: 'language'|'elsewhere'}} PlainDocument
- * @typedef {Always & {show: 'wait', why: 'held'|'preparing'|'failed'}} WaitDocument
- * @typedef {Always & {show: 'over', how: 'done'|'declined'|'ended'}} OverDocument
- * @typedef {Always & {show: 'questions', title: string, text: string, questions: Question[]}
- *   } QuestionsDocument
- * @typedef {Always & {show: 'page', consent: boolean, tree: PageNode[]}} PageDocument
- * @typedef {Always & {show: 'break', text: string, left_s: number}} BreakDocument
- * @typedef {Always & {show: 'device', text: string}} DeviceDocument
- * @typedef {Always & {show: 'drive', phase: 'ready'|'countdown'|'driving'|'ended', link: string,
- *   attempt: number, practice: boolean, number: number}} DriveDocument
- * @typedef {PlainDocument|WaitDocument|OverDocument|QuestionsDocument|PageDocument|BreakDocument
- *   |DeviceDocument|DriveDocument} DeskDocument
- *
- * @typedef {Record<string, string>} WordTable  the page's own words, by their key
- * @typedef {{type: 'words', words: WordTable}} WordsMessage
- * @typedef {{type: 'refused', item: string, text: string}} RefusedMessage
- * @typedef {{type: 'pong', t: number, at: number}} PongMessage  `at` is the server's clock [s]
- *
- * @typedef {{answers?: Record<string, Answer>, agreed?: boolean, device?: string,
- *   moved?: string[], shown_at: number, answered_at: number, taken_s: number,
- *   after_s?: Record<string, number>}} Told  times of the server's clock [s]
- */
-export {};
+/** The messages between the participant's page and the desk's server. */
+
+export type Answer = number | string | string[] | null;
+export interface Asked { name: string; ask: string; required: boolean }
+
+export interface LikertQuestion extends Asked {
+  kind: 'likert';
+  points: number;
+  left: string;
+  right: string;
+  labels: string[];
+}
+
+export interface SliderQuestion extends Asked {
+  kind: 'slider';
+  low: number;
+  high: number;
+  step: number;
+  left: string;
+  right: string;
+}
+
+export interface ChoiceQuestion extends Asked {
+  kind: 'choice';
+  several: boolean;
+  choices: [name: string, text: string][];
+}
+
+export interface NumberQuestion extends Asked {
+  kind: 'number';
+  low: number;
+  high: number;
+  whole: boolean;
+  unit: string;
+}
+
+export interface TextQuestion extends Asked { kind: 'text'; longest: number }
+export type Question = LikertQuestion | SliderQuestion | ChoiceQuestion | NumberQuestion
+  | TextQuestion;
+/** An element of a Markdown page. */
+export type PageNode = string
+  | { tag: string; children?: PageNode[]; href?: string; src?: string; alt?: string };
+export interface Progress { done: number; of: number; drives_done: number; drives: number }
+
+/** `again` is the number of repeats of the item. */
+export interface Always {
+  type: 'desk';
+  study: string;
+  participant: string;
+  language: string;
+  languages: string[];
+  item: string;
+  again: number;
+  progress?: Progress;
+}
+
+export interface PlainDocument extends Always { show: 'language' | 'elsewhere' }
+export interface WaitDocument extends Always { show: 'wait'; why: 'held' | 'preparing' | 'failed' }
+export interface OverDocument extends Always { show: 'over'; how: 'done' | 'declined' | 'ended' }
+
+export interface QuestionsDocument extends Always {
+  show: 'questions';
+  title: string;
+  text: string;
+  questions: Question[];
+}
+
+export interface PageDocument extends Always { show: 'page'; consent: boolean; tree: PageNode[] }
+export interface BreakDocument extends Always { show: 'break'; text: string; left_s: number }
+export interface DeviceDocument extends Always { show: 'device'; text: string }
+
+export interface DriveDocument extends Always {
+  show: 'drive';
+  phase: 'ready' | 'countdown' | 'driving' | 'ended';
+  link: string;
+  attempt: number;
+  practice: boolean;
+  number: number;
+}
+
+export type DeskDocument = PlainDocument | WaitDocument | OverDocument | QuestionsDocument
+  | PageDocument | BreakDocument | DeviceDocument | DriveDocument;
+export type WordTable = Record<string, string>; // the page's own words, by their key
+export interface WordsMessage { type: 'words'; words: WordTable }
+export interface RefusedMessage { type: 'refused'; item: string; text: string }
+/** `at` is the server's clock [s]. */
+export interface PongMessage { type: 'pong'; t: number; at: number }
+
+/** Times of the server's clock [s]. */
+export interface Told {
+  answers?: Record<string, Answer>;
+  agreed?: boolean;
+  device?: string;
+  moved?: string[];
+  shown_at: number;
+  answered_at: number;
+  taken_s: number;
+  after_s?: Record<string, number>;
+}

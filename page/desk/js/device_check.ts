@@ -11,12 +11,13 @@ import {
 import { ACTIONS } from '../../cockpit/js/driving/keyboard.js';
 import { button } from './page_view.js';
 
-/** @import { DeviceDocument } from './desk_messages.js' */
-/** @import { Words } from './words.js' */
+import type { DeviceDocument } from './desk_messages.js';
+import type { Words } from './words.js';
+import type { Profile } from '../../cockpit/js/driving/gamepad_profile.js';
 
-/** @typedef {'left'|'right'|'throttle'|'brake'} Movement */
+export type Movement = 'left' | 'right' | 'throttle' | 'brake';
 
-export const MOVEMENTS = /** @type {Movement[]} */ (['left', 'right', 'throttle', 'brake']);
+export const MOVEMENTS: Movement[] = ['left', 'right', 'throttle', 'brake'];
 // This share of its travel counts as moved.
 const MOVED = 0.6;
 // An axis this far from its first position was moved by the participant.
@@ -27,9 +28,9 @@ const KEYBOARD = 'keyboard';
 /**
  * Return this browser's stored calibrations for the stage, whose address has another port.
  *
- * @returns {Record<string, string>} JSON of a profile, by the device's name
+ * @returns JSON of a profile, by the device's name
  */
-export function calibrations() {
+export function calibrations(): Record<string, string> {
   return Object.fromEntries(Object.entries(localStorage).filter(([key]) => key.startsWith(PREFIX))
     .map(([key, value]) => [key.slice(PREFIX.length), value]));
 }
@@ -41,10 +42,8 @@ export class DeviceCheck {
   #chosen = KEYBOARD;
   // Whether the participant has chosen the device, so that touching one no longer chooses it.
   #told = false;
-  /** @type {Map<string, number[]>} where the axes were first, by the device */
-  #rest = new Map();
-  /** @type {Set<Movement>} */
-  #moved = new Set();
+  #rest = new Map<string, number[]>(); // where the axes were first, by the device
+  #moved = new Set<Movement>();
   #frame = 0;
   #list = element('ul', { class: 'movements' });
   #devices = element('div', { class: 'options choices', role: 'radiogroup' });
@@ -53,15 +52,11 @@ export class DeviceCheck {
   #calibrate;
   #calibration = new CalibrationDialog((index, profile) => this.#keep(index, profile));
   #ids = '';
-  /** @type {(event: KeyboardEvent) => void} */
-  #key = (event) => this.#press(event);
+  #key = (event: KeyboardEvent) => this.#press(event);
+  node;
 
-  /**
-   * @param {DeviceDocument} shown
-   * @param {Words} words
-   * @param {(told: {device: string, moved: string[]}) => void} finish
-   */
-  constructor({ text }, words, finish) {
+  constructor({ text }: DeviceDocument, words: Words,
+    finish: (told: { device: string; moved: string[] }) => void) {
     this.#words = words;
     this.#finish = finish;
     this.#calibrate = button(words.of('device_calibrate'), '', () => this.#openCalibration());
@@ -108,10 +103,8 @@ export class DeviceCheck {
 
   /**
    * Choose a wheel or gamepad that is moved or pressed, unless the check of the keys is complete.
-   *
-   * @param {Gamepad[]} pads
    */
-  #chooseTouched(pads) {
+  #chooseTouched(pads: Gamepad[]) {
     for (const pad of pads) {
       const key = `${pad.index} ${pad.id}`;
       const rest = this.#rest.get(key) ?? pad.axes.map(Number);
@@ -132,10 +125,8 @@ export class DeviceCheck {
     }
   }
 
-  /** @param {Gamepad[]} pads */
-  #showDevices(pads) {
-    /** @type {(value: string, label: string) => HTMLElement} */
-    const option = (value, label) => {
+  #showDevices(pads: Gamepad[]) {
+    const option = (value: string, label: string): HTMLElement => {
       const input = element('input', { type: 'radio', name: 'device', value,
         on: { change: () => {
           this.#told = true;
@@ -153,8 +144,7 @@ export class DeviceCheck {
     this.#choose(this.#chosen);
   }
 
-  /** @param {string} chosen */
-  #choose(chosen) {
+  #choose(chosen: string) {
     if (chosen !== this.#chosen) {
       this.#moved.clear();
     }
@@ -163,8 +153,7 @@ export class DeviceCheck {
     this.#showList();
   }
 
-  /** @param {KeyboardEvent} event */
-  #press(event) {
+  #press(event: KeyboardEvent) {
     const movement = MOVEMENTS.find((name) => name === ACTIONS[event.code]);
     const { target } = event;
     // Arrows choose in a group, and the space bar presses a button, as in any browser.
@@ -176,11 +165,7 @@ export class DeviceCheck {
     }
   }
 
-  /**
-   * @param {Movement} movement
-   * @param {boolean} moved
-   */
-  #note(movement, moved) {
+  #note(movement: Movement, moved: boolean) {
     if (moved && !this.#moved.has(movement)) {
       this.#moved.add(movement);
       this.#showList();
@@ -209,11 +194,7 @@ export class DeviceCheck {
     this.#calibration.open(Number(this.#chosen));
   }
 
-  /**
-   * @param {number} index
-   * @param {import('../../cockpit/js/driving/gamepad_profile.js').Profile|null} profile
-   */
-  #keep(index, profile) {
+  #keep(index: number, profile: Profile | null) {
     const pad = connectedPads().find((candidate) => candidate.index === index);
     if (pad) {
       saveProfile(pad.id, profile);

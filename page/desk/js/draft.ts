@@ -2,45 +2,44 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Answers that are not on the server yet, stored so that a reload loses nothing. */
 
-/** @import { Answer, DeskDocument } from './desk_messages.js' */
+import type { Answer, DeskDocument } from './desk_messages.js';
 
 const PREFIX = 'crgame.draft.';
 
-/**
- * @typedef {{shown_at: number, answers: Record<string, Answer>,
- *   after_s: Record<string, number>}} DraftState
- */
+export interface DraftState {
+  shown_at: number;
+  answers: Record<string, Answer>;
+  after_s: Record<string, number>;
+}
 
 /** The draft of one item, in this tab's storage. */
 export class Draft {
   #key;
   #clock_s;
-  /** @type {DraftState} */
-  #state;
+  #state: DraftState;
 
   /**
-   * @param {string} name of it, see draftName
-   * @param {() => number} clock_s seconds since 1970
+   * @param name of it, see draftName
+   * @param clock_s seconds since 1970
    */
-  constructor(name, clock_s) {
+  constructor(name: string, clock_s: () => number) {
     this.#key = PREFIX + name;
     this.#clock_s = clock_s;
     this.#state = read(this.#key) ?? { shown_at: clock_s(), answers: {}, after_s: {} };
     this.#write();
   }
 
-  /** @returns {Record<string, Answer>} by the question's name */
-  get answers() {
+  /** @returns by the question's name */
+  get answers(): Record<string, Answer> {
     return this.#state.answers;
   }
 
   /**
    * Keep an answer.
    *
-   * @param {string} name of the question
-   * @param {Answer} answer
+   * @param name of the question
    */
-  put(name, answer) {
+  put(name: string, answer: Answer) {
     this.#state.answers[name] = answer;
     this.#state.after_s[name] = this.#since(this.#clock_s());
     this.#write();
@@ -53,8 +52,7 @@ export class Draft {
       after_s: this.#state.after_s };
   }
 
-  /** @param {number} now_s */
-  #since(now_s) {
+  #since(now_s: number) {
     return Math.max(0, Math.round(1000 * (now_s - this.#state.shown_at)) / 1000);
   }
 
@@ -67,21 +65,17 @@ export class Draft {
   }
 }
 
-/**
- * Return the name of the shown item's draft; a repeated item gets a new one.
- *
- * @param {DeskDocument} shown
- */
-export function draftName({ study, participant, item, again }) {
+/** Return the name of the shown item's draft; a repeated item gets a new one. */
+export function draftName({ study, participant, item, again }: DeskDocument) {
   return `${study}.${participant}.${item}.${again}`;
 }
 
 /**
  * Remove all drafts but one: earlier answers are on the server.
  *
- * @param {string} name of the one that stays
+ * @param name of the one that stays
  */
-export function forgetOtherDrafts(name) {
+export function forgetOtherDrafts(name: string) {
   for (const key of Object.keys(sessionStorage)) {
     if (key.startsWith(PREFIX) && key !== PREFIX + name) {
       sessionStorage.removeItem(key);
@@ -89,11 +83,7 @@ export function forgetOtherDrafts(name) {
   }
 }
 
-/**
- * @param {string} key
- * @returns {DraftState|null}
- */
-function read(key) {
+function read(key: string): DraftState | null {
   try {
     const state = JSON.parse(sessionStorage.getItem(key) ?? 'null');
     return Number.isFinite(state?.shown_at) && state.answers && state.after_s ? state : null;

@@ -6,10 +6,10 @@ import { element, setAttribute, setText } from '../../cockpit/js/dom.js';
 import { calibrations } from './device_check.js';
 import { button } from './page_view.js';
 
-/** @import { DriveDocument, Progress } from './desk_messages.js' */
-/** @import { Words } from './words.js' */
+import type { DriveDocument, Progress } from './desk_messages.js';
+import type { Words } from './words.js';
+import type { StageState } from '../../cockpit/js/stage/stage_messages.js';
 
-/** @import { StageState } from '../../cockpit/js/stage/stage_messages.js' */
 
 const LOOPBACK = ['127.0.0.1', 'localhost'];
 
@@ -18,12 +18,10 @@ export class DriveFrame {
   #root;
   #words;
   #ready;
-  /** @type {HTMLIFrameElement|null} */
-  #frame = null;
+  #frame: HTMLIFrameElement | null = null;
   #link = '';
   #phase = '';
-  /** @type {Partial<StageState>} */
-  #state = {};
+  #state: Partial<StageState> = {};
   #title = element('h2');
   #text = element('p', { class: 'lead' });
   #status = element('p', { role: 'status' });
@@ -31,11 +29,10 @@ export class DriveFrame {
   #gate;
 
   /**
-   * @param {HTMLElement} root the element that fills the page during a drive
-   * @param {Words} words
-   * @param {() => void} ready told that the participant is ready
+   * @param root the element that fills the page during a drive
+   * @param ready told that the participant is ready
    */
-  constructor(root, words, ready) {
+  constructor(root: HTMLElement, words: Words, ready: () => void) {
     this.#root = root;
     this.#words = words;
     this.#ready = ready;
@@ -51,12 +48,8 @@ export class DriveFrame {
     return this.#state;
   }
 
-  /**
-   * Show a drive.
-   *
-   * @param {DriveDocument} shown
-   */
-  show(shown) {
+  /** Show a drive. */
+  show(shown: DriveDocument) {
     const entered = shown.phase !== this.#phase || this.#root.hidden;
     this.#root.hidden = false;
     this.#load(shown.link);
@@ -117,8 +110,7 @@ export class DriveFrame {
     }
   }
 
-  /** @param {string} link */
-  #load(link) {
+  #load(link: string) {
     if (link === this.#link) {
       return;
     }
@@ -134,16 +126,14 @@ export class DriveFrame {
     }
   }
 
-  /** @param {Record<string, unknown>} message */
-  #post(message) {
+  #post(message: Record<string, unknown>) {
     const src = stageAddress(this.#link, window.location);
     if (src !== null) {
       this.#frame?.contentWindow?.postMessage({ crgame: 1, ...message }, src.origin);
     }
   }
 
-  /** @param {MessageEvent} event */
-  #hear(event) {
+  #hear(event: MessageEvent) {
     const src = stageAddress(this.#link, window.location);
     if (src === null || event.origin !== src.origin
         || event.source !== this.#frame?.contentWindow) {
@@ -165,11 +155,10 @@ export class DriveFrame {
 /**
  * Return the stage's address with this page's host name, because cookies belong to one host.
  *
- * @param {string} link
- * @param {{hostname: string}} location of this page
- * @returns {URL|null} null if the link is not a page's address
+ * @param location of this page
+ * @returns null if the link is not a page's address
  */
-export function stageAddress(link, location) {
+export function stageAddress(link: string, location: { hostname: string }): URL | null {
   if (!URL.canParse(link)) {
     return null;
   }
@@ -183,12 +172,8 @@ export function stageAddress(link, location) {
   return url;
 }
 
-/**
- * @param {DriveDocument} shown
- * @param {Progress|undefined} progress
- * @param {Words} words
- */
-function titleOf({ practice, number }, progress, words) {
+function titleOf({ practice, number }: DriveDocument, progress: Progress | undefined,
+  words: Words) {
   return practice ? words.of('practice', { number })
     : words.of('drive', { number, of: progress?.drives ?? number });
 }

@@ -7,18 +7,20 @@ import { DeskConnection } from './desk_connection.js';
 import { entryWords, timeOfDay } from './log_words.js';
 import { askReason } from './reason_dialog.js';
 
-/** @import { ExperimenterDocument, ItemRow } from './experimenter_messages.js' */
-/** @import { ExperimenterMessage, Unnumbered } from './page_messages.js' */
+import type { ReplyMessage } from '../../cockpit/js/messages.js';
+import type { ExperimenterDocument, ItemRow } from './experimenter_messages.js';
+import type { ExperimenterMessage, Unnumbered } from './page_messages.js';
 
 const MARKER_KEYS = ['F1', 'F2', 'F3', 'F4', 'F5', 'F6', 'F7', 'F8', 'F9'];
 
+type Received = ExperimenterDocument | ReplyMessage;
+
 /** The whole page. */
 class ExperimenterPage {
-  /** @type {ExperimenterDocument|null} */
-  #shown = null;
+  #shown: ExperimenterDocument | null = null;
   #lastId = 0;
   #answer = part(document.body, 'answer');
-  #connection = new DeskConnection('/ws/experimenter', {
+  #connection = new DeskConnection<Received>('/ws/experimenter', {
     opened: () => {
       part(document.body, 'lost').hidden = true;
     },
@@ -32,8 +34,7 @@ class ExperimenterPage {
     received: (message) => this.#receive(message),
   });
 
-  /** @type {Record<'hold'|'skip'|'abort'|'end', HTMLButtonElement>} */
-  #orders = {
+  #orders: Record<'hold' | 'skip' | 'abort' | 'end', HTMLButtonElement> = {
     hold: order('', () => this.#send({ type: 'hold', held: !this.#shown?.held })),
     abort: order('Abort the drive', () => this.#reasoned('abort', 'Abort the drive',
       'It counts for nothing, and comes again.')),
@@ -45,7 +46,7 @@ class ExperimenterPage {
   constructor() {
     part(document.body, 'orders').append(...Object.values(this.#orders));
     this.#orders.end.classList.add('danger');
-    const note = /** @type {HTMLTextAreaElement} */ (part(document.body, 'note'));
+    const note = part(document.body, 'note') as HTMLTextAreaElement;
     const keep = () => {
       if (note.value.trim() && this.#send({ type: 'note', text: note.value })) {
         note.value = '';
@@ -70,8 +71,7 @@ class ExperimenterPage {
     });
   }
 
-  /** @param {Unnumbered<ExperimenterMessage>} message */
-  #send(message) {
+  #send(message: Unnumbered<ExperimenterMessage>) {
     this.#lastId += 1;
     const sent = this.#connection.send({ ...message, id: this.#lastId });
     if (!sent) {
@@ -80,17 +80,12 @@ class ExperimenterPage {
     return sent;
   }
 
-  /**
-   * @param {string} text
-   * @param {boolean} bad
-   */
-  #showAnswer(text, bad) {
+  #showAnswer(text: string, bad: boolean) {
     setText(this.#answer, text);
     setAttribute(this.#answer, 'data-bad', bad);
   }
 
-  /** @param {any} message */
-  #receive(message) {
+  #receive(message: Received) {
     if (message.type === 'reply') {
       this.#showAnswer(message.ok ? 'Kept.' : message.text, !message.ok);
     } else if (message.type === 'desk') {
@@ -98,12 +93,7 @@ class ExperimenterPage {
     }
   }
 
-  /**
-   * @param {'skip'|'abort'} type
-   * @param {string} title
-   * @param {string} text
-   */
-  async #reasoned(type, title, text) {
+  async #reasoned(type: 'skip' | 'abort', title: string, text: string) {
     const item = this.#shown?.item ?? '';
     const reason = await askReason(`${title}: ${item}`, text, title);
     if (reason !== null) {
@@ -120,8 +110,7 @@ class ExperimenterPage {
     }
   }
 
-  /** @param {ItemRow} row */
-  async #repeat({ id, kind }) {
+  async #repeat({ id, kind }: ItemRow) {
     const reason = await askReason(`Repeat ${kind}`,
       `${id} comes again now; what was told before stays in the journal.`, 'Repeat');
     if (reason !== null) {
@@ -129,8 +118,7 @@ class ExperimenterPage {
     }
   }
 
-  /** @param {ExperimenterDocument} shown */
-  #show(shown) {
+  #show(shown: ExperimenterDocument) {
     this.#shown = shown;
     document.title = `${shown.participant}: ${shown.study}`;
     setText(part(document.body, 'study'), shown.study);
@@ -143,8 +131,7 @@ class ExperimenterPage {
     this.#showLog(shown);
   }
 
-  /** @param {ExperimenterDocument} shown */
-  #showPage({ page }) {
+  #showPage({ page }: ExperimenterDocument) {
     const node = part(document.body, 'page');
     const delay = page.round_trip_ms === undefined ? ''
       : `, round trip ${Math.round(page.round_trip_ms)} ms`;
@@ -156,8 +143,7 @@ class ExperimenterPage {
     node.dataset.connected = String(page.connected);
   }
 
-  /** @param {ExperimenterDocument} shown */
-  #showNow(shown) {
+  #showNow(shown: ExperimenterDocument) {
     const { drive, over } = shown;
     const row = shown.items.find(({ id }) => id === shown.item);
     setText(part(document.body, 'now-title'), over
@@ -193,8 +179,7 @@ class ExperimenterPage {
     setAttribute(this.#orders.end, 'disabled', Boolean(over || shown.ending));
   }
 
-  /** @param {string[]} markers */
-  #showMarkers(markers) {
+  #showMarkers(markers: string[]) {
     const node = part(document.body, 'markers');
     const key = markers.join('\n');
     if (node.dataset.key !== key) {
@@ -209,8 +194,7 @@ class ExperimenterPage {
     }
   }
 
-  /** @param {ItemRow[]} rows */
-  #showItems(rows) {
+  #showItems(rows: ItemRow[]) {
     const body = part(document.body, 'items');
     const key = JSON.stringify(rows);
     if (body.dataset.key === key) {
@@ -231,8 +215,7 @@ class ExperimenterPage {
     }));
   }
 
-  /** @param {ExperimenterDocument} shown */
-  #showLog({ log }) {
+  #showLog({ log }: ExperimenterDocument) {
     const node = part(document.body, 'log');
     const key = `${log.length} ${log.at(-1)?.at}`;
     if (node.dataset.key !== key) {
@@ -243,11 +226,7 @@ class ExperimenterPage {
   }
 }
 
-/**
- * @param {string} text
- * @param {() => void} act
- */
-function order(text, act) {
+function order(text: string, act: () => void) {
   return element('button', { type: 'button', text, on: { click: act } });
 }
 

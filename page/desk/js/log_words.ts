@@ -2,15 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Journal entries as one line each. */
 
-/** @import { LogEntry } from './experimenter_messages.js' */
+import type { LogEntry } from './experimenter_messages.js';
 
-/**
- * Return an entry as text.
- *
- * @param {LogEntry} entry
- * @returns {string}
- */
-export function entryWords(entry) {
+/** Return an entry as text. */
+export function entryWords(entry: LogEntry): string {
   const { entry: kind, item, time_s, run, ...rest } = entry;
   const clock = typeof time_s === 'number' ? ` at ${time_s.toFixed(1)} s of ${run}` : '';
   const of = typeof item === 'string' && item ? ` ${item}` : '';
@@ -33,9 +28,8 @@ export function entryWords(entry) {
 /**
  * Return the time of day.
  *
- * @param {number} at seconds since 1970
- * @returns {string}
+ * @param at seconds since 1970
  */
-export function timeOfDay(at) {
+export function timeOfDay(at: number): string {
   return new Date(1000 * at).toLocaleTimeString('en-GB');
 }

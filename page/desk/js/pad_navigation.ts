@@ -4,29 +4,28 @@
 
 import { connectedPads } from '../../cockpit/js/driving/gamepad.js';
 
-/** @typedef {'previous'|'next'|'up'|'down'|'confirm'} PadOrder */
+export type PadOrder = 'previous' | 'next' | 'up' | 'down' | 'confirm';
 
 // Of the standard mapping: arrows, shoulder buttons, the lowest of the four.
-const STANDARD = /** @type {Record<number, PadOrder>} */ ({
-  14: 'previous', 15: 'next', 12: 'up', 13: 'down', 4: 'previous', 5: 'next', 0: 'confirm' });
+const STANDARD: Record<number, PadOrder> = {
+  14: 'previous', 15: 'next', 12: 'up', 13: 'down', 4: 'previous', 5: 'next', 0: 'confirm' };
 // Wheels: paddles, and the first two buttons.
-const WHEEL = /** @type {Record<number, PadOrder>} */ ({
-  5: 'previous', 4: 'next', 0: 'confirm', 1: 'up' });
+const WHEEL: Record<number, PadOrder> = {
+  5: 'previous', 4: 'next', 0: 'confirm', 1: 'up' };
 const STOPS = '.question, button:not([disabled]):not([hidden])';
 
 /** Listens while anything but a drive is shown. */
 export class PadNavigation {
   #sheet;
   #drive;
-  /** @type {Map<number, boolean[]>} */
-  #pressed = new Map();
+  #pressed = new Map<number, boolean[]>();
   #frame = 0;
 
   /**
-   * @param {HTMLElement} sheet the element with the questions
-   * @param {HTMLElement} drive the gate before a drive
+   * @param sheet the element with the questions
+   * @param drive the gate before a drive
    */
-  constructor(sheet, drive) {
+  constructor(sheet: HTMLElement, drive: HTMLElement) {
     this.#sheet = sheet;
     this.#drive = drive;
     window.addEventListener('gamepadconnected', () => this.#poll());
@@ -55,8 +54,7 @@ export class PadNavigation {
     }
   }
 
-  /** @param {PadOrder} order */
-  #apply(order) {
+  #apply(order: PadOrder) {
     const root = this.#drive.hidden ? this.#sheet : this.#drive;
     if (document.querySelector('dialog[open]')
         || root.querySelector('.device-check:not([data-complete])')) {
@@ -81,8 +79,7 @@ export class PadNavigation {
   }
 }
 
-/** @param {Element|undefined} stop */
-function enter(stop) {
+function enter(stop: Element | undefined) {
   const target = stop?.matches('button') ? stop
     : stop?.querySelector('input:checked') ?? stop?.querySelector('input, textarea');
   if (target instanceof HTMLElement) {
@@ -91,12 +88,7 @@ function enter(stop) {
   }
 }
 
-/**
- * @param {Element} stop
- * @param {Element|null} focused
- * @param {Element|undefined} following
- */
-function confirm(stop, focused, following) {
+function confirm(stop: Element, focused: Element | null, following: Element | undefined) {
   if (focused instanceof HTMLInputElement && focused.type === 'checkbox') {
     focused.click();
   } else if (focused instanceof HTMLInputElement && focused.type === 'radio'
@@ -109,13 +101,8 @@ function confirm(stop, focused, following) {
   }
 }
 
-/**
- * @param {Element} stop
- * @param {Element|null} focused
- * @param {1|-1} by
- * @param {Element|undefined} following
- */
-function change(stop, focused, by, following) {
+function change(stop: Element, focused: Element | null, by: 1 | -1,
+  following: Element | undefined) {
   const inputs = [...stop.querySelectorAll('input')];
   if (!(focused instanceof HTMLInputElement)) {
     return;

@@ -4,20 +4,15 @@
 
 import { element } from '../../cockpit/js/dom.js';
 
-/** @import { PageDocument, PageNode } from './desk_messages.js' */
-/** @import { Words } from './words.js' */
+import type { PageDocument, PageNode } from './desk_messages.js';
+import type { Words } from './words.js';
 
-const TAGS = /** @type {const} */ (['h1', 'h2', 'h3', 'h4', 'h5', 'h6', 'p', 'ul', 'ol', 'li',
+const TAGS = ['h1', 'h2', 'h3', 'h4', 'h5', 'h6', 'p', 'ul', 'ol', 'li',
   'blockquote', 'hr', 'em', 'strong', 's', 'table', 'thead', 'tbody', 'tr', 'th', 'td', 'br',
-  'code', 'pre', 'span']);
+  'code', 'pre', 'span'] as const;
 
-/**
- * Build the nodes of a page.
- *
- * @param {PageNode[]} tree
- * @returns {Node[]}
- */
-export function pageNodes(tree) {
+/** Build the nodes of a page. */
+export function pageNodes(tree: PageNode[]): Node[] {
   return tree.map((node) => {
     if (typeof node === 'string') {
       return document.createTextNode(node);
@@ -35,15 +30,9 @@ export function pageNodes(tree) {
   });
 }
 
-/**
- * Build a page with its button to continue.
- *
- * @param {PageDocument} shown
- * @param {Words} words
- * @param {(agreed?: boolean) => void} finish
- * @returns {HTMLElement}
- */
-export function pageView({ tree, consent }, words, finish) {
+/** Build a page with its button to continue. */
+export function pageView({ tree, consent }: PageDocument, words: Words,
+  finish: (agreed?: boolean) => void): HTMLElement {
   const article = element('article', { class: 'reading' }, ...pageNodes(tree));
   const buttons = element('div', { class: 'go-on' });
   if (!consent) {
@@ -64,11 +53,6 @@ export function pageView({ tree, consent }, words, finish) {
   return element('div', {}, article, buttons);
 }
 
-/**
- * @param {string} text
- * @param {string} kind
- * @param {() => void} act
- */
-export function button(text, kind, act) {
+export function button(text: string, kind: string, act: () => void) {
   return element('button', { type: 'button', class: kind || null, text, on: { click: act } });
 }

@@ -13,25 +13,25 @@ import { button, pageView } from './page_view.js';
 import { questionForm } from './question_form.js';
 import { Words } from './words.js';
 
-/** @import { DeskDocument, Told } from './desk_messages.js' */
+import type { DeskDocument, RefusedMessage, Told, WordsMessage } from './desk_messages.js';
 
 const ANSWERED = ['questions', 'page', 'break', 'device'];
 const PAGE_KEY = 'crgame.desk.page';
+
+type Received = DeskDocument | WordsMessage | RefusedMessage;
 
 /** The whole page. */
 class ParticipantPage {
   #words = new Words();
   #sheet = part(document.body, 'sheet');
   #lost = part(document.body, 'lost');
-  /** @type {DeskDocument|null} */
-  #shown = null;
-  /** @type {DeviceCheck|null} */
-  #check = null;
+  #shown: DeskDocument | null = null;
+  #check: DeviceCheck | null = null;
   // The message that was sent but not answered yet.
   #sent = '';
   #drive = new DriveFrame(part(document.body, 'drive'), this.#words,
     () => this.#connection.send({ type: 'ready', item: this.#shown?.item ?? '' }));
-  #connection = new DeskConnection('/ws/participant', {
+  #connection = new DeskConnection<Received>('/ws/participant', {
     opened: (again) => {
       this.#connection.send({ type: 'hello', page: pageKey(), fresh: !again });
       this.#sent = '';
@@ -55,8 +55,7 @@ class ParticipantPage {
       ...Number.isFinite(input_delay_ms) ? { drive_delay_ms: input_delay_ms } : {} };
   }
 
-  /** @param {any} message */
-  #receive(message) {
+  #receive(message: Received) {
     switch (message.type) {
       case 'words':
         this.#words.load(message.words);
@@ -74,18 +73,14 @@ class ParticipantPage {
     }
   }
 
-  /** @param {string} text */
-  #refuse(text) {
+  #refuse(text: string) {
     this.#sheet.querySelector('.refused')?.remove();
     this.#sheet.append(element('p', { class: 'problem refused', role: 'alert',
       text: `${this.#words.of('refused')} ${text}` }));
   }
 
-  /**
-   * @param {DeskDocument} shown
-   * @param {boolean} [anew] also if the same is shown already
-   */
-  #show(shown, anew = false) {
+  /** @param anew also if the same is shown already */
+  #show(shown: DeskDocument, anew = false) {
     const before = this.#shown;
     this.#shown = shown;
     document.documentElement.lang = shown.language;
@@ -120,8 +115,8 @@ class ParticipantPage {
     this.#sheet.replaceChildren();
   }
 
-  /** @param {boolean} moved whether the person has just come from another item */
-  #focus(moved) {
+  /** @param moved whether the person has just come from another item */
+  #focus(moved: boolean) {
     const first = this.#sheet.querySelector('input:not([type=checkbox]), textarea');
     const fits = this.#sheet.scrollHeight <= window.innerHeight;
     // Never focus a button: a key that is still held would agree or continue without reading.
@@ -129,8 +124,7 @@ class ParticipantPage {
     target.focus({ preventScroll: true });
   }
 
-  /** @param {DeskDocument} shown */
-  #showProgress({ progress }) {
+  #showProgress({ progress }: DeskDocument) {
     const bar = part(document.body, 'progress');
     bar.hidden = progress === undefined;
     if (progress) {
@@ -145,17 +139,12 @@ class ParticipantPage {
     }
   }
 
-  /**
-   * @param {Exclude<DeskDocument, {show: 'drive'}>} shown
-   * @returns {HTMLElement}
-   */
-  #view(shown) {
+  #view(shown: Exclude<DeskDocument, { show: 'drive' }>): HTMLElement {
     const words = this.#words;
     // An item that the page waits for has not been shown yet.
     const draft = !ANSWERED.includes(shown.show) ? null
       : new Draft(draftName(shown), () => this.#connection.now_s);
-    /** @param {Partial<Told>} told */
-    const finish = (told) => {
+    const finish = (told: Partial<Told>) => {
       if (draft && this.#sent !== shown.item) {
         this.#sent = this.#connection.send({ type: 'finish', item: shown.item, ...draft.times(),
           ...told }) ? shown.item : '';
@@ -184,8 +173,7 @@ class ParticipantPage {
     }
   }
 
-  /** @param {string[]} languages */
-  #languages(languages) {
+  #languages(languages: string[]) {
     return element('div', { class: 'languages' },
       element('h2', { text: this.#words.of('choose_language') }),
       ...languages.map((language) => {
@@ -198,28 +186,19 @@ class ParticipantPage {
   }
 }
 
-/**
- * @param {string} title
- * @param {string} text
- * @param {boolean} [waits]
- */
-function notice(title, text, waits = false) {
+function notice(title: string, text: string, waits = false) {
   return element('div', { class: 'message', role: 'status' }, element('h2', { text: title }),
     element('p', { class: 'lead', text }),
     waits ? element('div', { class: 'waiting', 'aria-hidden': 'true' }) : null);
 }
 
-/**
- * Return a key of the shown document that changes if another page has to be built.
- *
- * @param {DeskDocument} shown
- */
-function keyOf(shown) {
+/** Return a key of the shown document that changes if another page has to be built. */
+function keyOf(shown: DeskDocument) {
   return JSON.stringify({ ...shown, progress: null, left_s: 0 });
 }
 
-/** @returns {string} the same as long as this tab lives */
-function pageKey() {
+/** @returns the same as long as this tab lives */
+function pageKey(): string {
   const kept = sessionStorage.getItem(PAGE_KEY);
   if (kept !== null && /^[0-9a-f]{32}$/.test(kept)) {
     return kept;

@@ -5,20 +5,17 @@
 import { element, setText } from '../../cockpit/js/dom.js';
 import { QuestionView } from './question_view.js';
 
-/** @import { QuestionsDocument, Told } from './desk_messages.js' */
-/** @import { Draft } from './draft.js' */
-/** @import { Words } from './words.js' */
+import type { QuestionsDocument, Told } from './desk_messages.js';
+import type { Draft } from './draft.js';
+import type { Words } from './words.js';
 
 /**
  * Build the form.
  *
- * @param {QuestionsDocument} shown
- * @param {Words} words
- * @param {Draft} draft
- * @param {(told: Told) => void} finish called with the answers once all are valid
- * @returns {HTMLElement}
+ * @param finish called with the answers once all are valid
  */
-export function questionForm(shown, words, draft, finish) {
+export function questionForm(shown: QuestionsDocument, words: Words, draft: Draft,
+  finish: (told: Told) => void): HTMLElement {
   const summary = element('p', { class: 'problem', role: 'alert' });
   const views = shown.questions.map((question) => {
     const view = new QuestionView(question, words, () => draft.put(view.name, view.answer));
@@ -27,8 +24,7 @@ export function questionForm(shown, words, draft, finish) {
     }
     return view;
   });
-  /** @param {Event} event */
-  const submit = (event) => {
+  const submit = (event: Event) => {
     event.preventDefault();
     const wrong = views.filter((view) => {
       view.show(view.refusal());

@@ -5,20 +5,19 @@
 import { element, setAttribute, setText } from '../../cockpit/js/dom.js';
 import { sliderControls } from './slider.js';
 
-/** @import { Answer, ChoiceQuestion, LikertQuestion, NumberQuestion, Question, TextQuestion
- * } from './desk_messages.js' */
-/** @import { Words } from './words.js' */
+import type {
+  Answer, ChoiceQuestion, LikertQuestion, NumberQuestion, Question, TextQuestion,
+} from './desk_messages.js';
+import type { Words } from './words.js';
 
-/**
- * The controls of one question.
- *
- * @typedef {object} Controls
- * @property {HTMLElement} node
- * @property {() => Answer} answer null where there is none
- * @property {(answer: Answer) => void} set
- * @property {() => string} refusal why the answer cannot be taken, empty if it can
- * @property {HTMLElement[]} inputs that take the focus
- */
+/** The controls of one question. */
+export interface Controls {
+  node: HTMLElement;
+  answer: () => Answer; // null where there is none
+  set: (answer: Answer) => void;
+  refusal: () => string; // why the answer cannot be taken, empty if it can
+  inputs: HTMLElement[]; // that take the focus
+}
 
 let numbers = 0;
 
@@ -28,13 +27,10 @@ export class QuestionView {
   #question;
   #words;
   #problem;
+  node;
 
-  /**
-   * @param {Question} question
-   * @param {Words} words
-   * @param {() => void} changed told when the person has changed the answer
-   */
-  constructor(question, words, changed) {
+  /** @param changed told when the person has changed the answer */
+  constructor(question: Question, words: Words, changed: () => void) {
     numbers += 1;
     const id = `question-${numbers}`;
     this.#question = question;
@@ -70,18 +66,17 @@ export class QuestionView {
     return this.#question.name;
   }
 
-  /** @returns {Answer} null where there is none */
-  get answer() {
+  /** @returns null where there is none */
+  get answer(): Answer {
     return this.#controls.answer();
   }
 
-  /** @param {Answer} answer */
-  set answer(answer) {
+  set answer(answer: Answer) {
     this.#controls.set(answer);
   }
 
-  /** @returns {string} why the answer cannot be taken, empty if it can */
-  refusal() {
+  /** @returns why the answer cannot be taken, empty if it can */
+  refusal(): string {
     const { answer } = this;
     const refusal = this.#controls.refusal();
     if (refusal) {
@@ -91,8 +86,8 @@ export class QuestionView {
     return none && this.#question.required ? this.#words.of('missing') : '';
   }
 
-  /** @param {string} problem empty for none */
-  show(problem) {
+  /** @param problem empty for none */
+  show(problem: string) {
     this.#problem.hidden = !problem;
     setText(this.#problem, problem);
     for (const input of this.#controls.inputs) {
@@ -108,14 +103,7 @@ export class QuestionView {
   }
 }
 
-/**
- * @param {Question} question
- * @param {Words} words
- * @param {string} id
- * @param {() => void} changed
- * @returns {Controls}
- */
-function controlsOf(question, words, id, changed) {
+function controlsOf(question: Question, words: Words, id: string, changed: () => void): Controls {
   switch (question.kind) {
     case 'likert': return likert(question, id, changed);
     case 'slider': return sliderControls(question, words, id, changed);
@@ -125,13 +113,8 @@ function controlsOf(question, words, id, changed) {
   }
 }
 
-/**
- * @param {LikertQuestion} question
- * @param {string} id
- * @param {() => void} changed
- * @returns {Controls}
- */
-function likert({ points, left, right, labels }, id, changed) {
+function likert({ points, left, right, labels }: LikertQuestion, id: string,
+  changed: () => void): Controls {
   const labelled = labels.length > 0;
   const places = Array.from({ length: points }, (_, i) => option(
     'radio', id, `${i + 1}`, labels[i] ?? `${i + 1}`, changed));
@@ -153,14 +136,8 @@ function likert({ points, left, right, labels }, id, changed) {
   };
 }
 
-/**
- * @param {ChoiceQuestion} question
- * @param {Words} words
- * @param {string} id
- * @param {() => void} changed
- * @returns {Controls}
- */
-function choice({ several, choices }, words, id, changed) {
+function choice({ several, choices }: ChoiceQuestion, words: Words, id: string,
+  changed: () => void): Controls {
   const options = choices.map(([name, label]) => option(
     several ? 'checkbox' : 'radio', id, name, label, changed));
   const list = element('div', { class: 'options choices' }, ...options.map(({ node }) => node));
@@ -179,25 +156,15 @@ function choice({ several, choices }, words, id, changed) {
   };
 }
 
-/**
- * @param {'radio'|'checkbox'} type
- * @param {string} name
- * @param {string} value
- * @param {string} label
- * @param {() => void} changed
- */
-function option(type, name, value, label, changed) {
+function option(type: 'radio' | 'checkbox', name: string, value: string, label: string,
+  changed: () => void) {
   const input = element('input', { type, name, value, on: { change: changed } });
   return { input, node: element('label', { class: 'option' }, input,
     element('span', { text: label })) };
 }
 
-/**
- * Return the key of the words that refuse a number: they name the limits that are set.
- *
- * @param {NumberQuestion} question
- */
-function refusalKey({ low, high, whole }) {
+/** Return the key of the words that refuse a number: they name the limits that are set. */
+function refusalKey({ low, high, whole }: NumberQuestion) {
   // A limit that is not set is that far away.
   const [hasLow, hasHigh] = [low > -1e9, high < 1e9];
   if (hasLow && hasHigh) {
@@ -209,14 +176,8 @@ function refusalKey({ low, high, whole }) {
   return `number${whole ? '_whole' : ''}${hasLow ? '_low' : '_high'}`;
 }
 
-/**
- * @param {NumberQuestion} question
- * @param {Words} words
- * @param {string} id
- * @param {() => void} changed
- * @returns {Controls}
- */
-function number(question, words, id, changed) {
+function number(question: NumberQuestion, words: Words, id: string,
+  changed: () => void): Controls {
   const { low, high, whole, unit } = question;
   // A text field, so that non-numbers are reported and the mouse wheel does not change the value.
   const input = element('input', { id, type: 'text', inputmode: whole && low >= 0 ? 'numeric'
@@ -242,19 +203,11 @@ function number(question, words, id, changed) {
   };
 }
 
-/** @param {string} given */
-function isNumber(given) {
+function isNumber(given: string) {
   return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(given) && Number.isFinite(Number(given));
 }
 
-/**
- * @param {TextQuestion} question
- * @param {Words} words
- * @param {string} id
- * @param {() => void} changed
- * @returns {Controls}
- */
-function text({ longest }, words, id, changed) {
+function text({ longest }: TextQuestion, words: Words, id: string, changed: () => void): Controls {
   const input = longest > 100 ? element('textarea', { id, rows: 4, on: { input: changed } })
     : element('input', { id, type: 'text', autocomplete: 'off', on: { input: changed } });
   return {

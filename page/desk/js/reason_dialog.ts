@@ -7,18 +7,16 @@ import { element } from '../../cockpit/js/dom.js';
 /**
  * Show the dialog and return the reason.
  *
- * @param {string} title
- * @param {string} text
- * @param {string} yes text of the button that confirms
- * @param {boolean} [reasoned] whether a reason is asked for
- * @returns {Promise<string|null>} the reason, empty where none is asked for; null for no
+ * @param yes text of the button that confirms
+ * @param reasoned whether a reason is asked for
+ * @returns the reason, empty where none is asked for; null for no
  */
-export function askReason(title, text, yes, reasoned = true) {
+export function askReason(title: string, text: string, yes: string,
+  reasoned = true): Promise<string | null> {
   return new Promise((resolve) => {
     const reason = element('input', { id: 'reason', type: 'text', required: true,
       autocomplete: 'off', maxlength: 2000 });
-    /** @type {string|null} */
-    let answer = null;
+    let answer: string | null = null;
     const dialog = element('dialog', { class: 'asking', 'aria-labelledby': 'asking-title', on: {
       close: () => {
         dialog.remove();

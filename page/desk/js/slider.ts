@@ -4,20 +4,17 @@
 
 import { element, setAttribute } from '../../cockpit/js/dom.js';
 
-/** @import { SliderQuestion } from './desk_messages.js' */
-/** @import { Controls } from './question_view.js' */
-/** @import { Words } from './words.js' */
+import type { SliderQuestion } from './desk_messages.js';
+import type { Controls } from './question_view.js';
+import type { Words } from './words.js';
 
 /**
  * Build the controls of a slider question.
  *
- * @param {SliderQuestion} question
- * @param {Words} words
- * @param {string} id of its input
- * @param {() => void} changed
- * @returns {Controls}
+ * @param id of its input
  */
-export function sliderControls({ low, high, step, left, right }, words, id, changed) {
+export function sliderControls({ low, high, step, left, right }: SliderQuestion, words: Words,
+  id: string, changed: () => void): Controls {
   const input = element('input', { id, type: 'range', min: low, max: high, step,
     class: 'slider' });
   let marked = false;

@@ -2,26 +2,22 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The page's own words in the participant's language. */
 
-/** @import { WordTable } from './desk_messages.js' */
+import type { WordTable } from './desk_messages.js';
 
 /** Words by their key; the server sends them before anything is shown. */
 export class Words {
-  /** @type {WordTable} */
-  #table = {};
+  #table: WordTable = {};
 
-  /** @param {WordTable} table */
-  load(table) {
+  load(table: WordTable) {
     this.#table = table;
   }
 
   /**
    * Return a text.
    *
-   * @param {string} key
-   * @param {Record<string, string|number>} [values] for the placeholders in braces
-   * @returns {string}
+   * @param values for the placeholders in braces
    */
-  of(key, values = {}) {
+  of(key: string, values: Record<string, string | number> = {}): string {
     return (this.#table[key] ?? key).replaceAll(
       /\{(\w+)\}/g, (whole, name) => (Object.hasOwn(values, name) ? `${values[name]}` : whole));
   }

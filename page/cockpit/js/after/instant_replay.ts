@@ -6,7 +6,7 @@ import { element, setAttribute, setText } from '../dom.js';
 import { clockTime } from '../panels/format.js';
 import { icon } from '../panels/icons.js';
 
-/** @import { Store } from '../store.js' */
+import type { Store } from '../store.js';
 
 export const REPLAYED_S = 10;
 const SPEEDS = [1, 0.5, 0.25, 0.1];
@@ -28,10 +28,10 @@ export class InstantReplay {
   #slider;
 
   /**
-   * @param {HTMLElement} root of the bar
-   * @param {Store} store its samples are shown
+   * @param root of the bar
+   * @param store its samples are shown
    */
-  constructor(root, store) {
+  constructor(root: HTMLElement, store: Store) {
     this.#root = root;
     this.#store = store;
     this.#play = element('button', { type: 'button', class: 'icon-button', 'data-action': 'play',
@@ -94,15 +94,13 @@ export class InstantReplay {
     }
   }
 
-  /** @param {boolean} open */
-  #setOpen(open) {
+  #setOpen(open: boolean) {
     setAttribute(this.#root, 'hidden', !open);
     // Parts that describe the present are hidden.
     setAttribute(document.body, 'data-past', open);
   }
 
-  /** @param {number} now_ms */
-  #timeAt(now_ms) {
+  #timeAt(now_ms: number) {
     if (this.#playing && Number.isFinite(this.#at_ms)) {
       const t = this.#t + this.#speed * Math.max(now_ms - this.#at_ms, 0) / 1000;
       this.#t = Math.min(t, this.#last);
@@ -126,20 +124,17 @@ export class InstantReplay {
     this.#setPlaying(!this.#playing);
   }
 
-  /** @param {number} t */
-  #seek(t) {
+  #seek(t: number) {
     this.#t = t;
     this.#setPlaying(false);
   }
 
-  /** @param {number} speed */
-  #setSpeed(speed) {
+  #setSpeed(speed: number) {
     this.#speed = speed;
     this.#show();
   }
 
-  /** @param {boolean} playing */
-  #setPlaying(playing) {
+  #setPlaying(playing: boolean) {
     this.#playing = playing;
     this.#at_ms = NaN;
     this.#play.replaceChildren(icon(playing ? 'pause' : 'go'));
@@ -152,10 +147,8 @@ export class InstantReplay {
 /**
  * Create the bar, closed.
  *
- * @param {HTMLElement} root #last-seconds
- * @param {Store} store
- * @returns {InstantReplay}
+ * @param root #last-seconds
  */
-export function createInstantReplay(root, store) {
+export function createInstantReplay(root: HTMLElement, store: Store): InstantReplay {
   return new InstantReplay(root, store);
 }

@@ -6,8 +6,8 @@ import { element, setAttribute, setText } from '../dom.js';
 import { isTyping } from '../driving/focus.js';
 import { reasonAgainstOrder } from '../rights.js';
 
-/** @import { Connection } from '../connection.js' */
-/** @import { Store } from '../store.js' */
+import type { Connection } from '../connection.js';
+import type { Store } from '../store.js';
 
 /** How long the key is held until the run restarts [ms]. */
 export const HELD_MS = 800;
@@ -19,17 +19,15 @@ const HINT = 'Hold R to begin anew';
 /**
  * Listen to the key.
  *
- * @param {HTMLElement} root gets the hint
- * @param {Store} store
- * @param {Connection} connection
- * @returns {{held: boolean}} held: whether the key is down and counts
+ * @param root gets the hint
+ * @returns held: whether the key is down and counts
  */
-export function createRestart(root, store, connection) {
+export function createRestart(root: HTMLElement, store: Store,
+  connection: Connection): { held: boolean } {
   const state = { held: false };
   const hint = element('div', { class: 'restart-hint', role: 'status', hidden: true });
   root.append(hint);
-  /** @type {number[]} */
-  let timers = [];
+  let timers: number[] = [];
   const end = () => {
     timers.forEach(clearTimeout);
     timers = [];

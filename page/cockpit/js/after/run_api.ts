@@ -5,49 +5,47 @@
 import { ask, OWN } from '../panels/scenario_api.js';
 import { oneLine } from '../panels/format.js';
 
-/** @import { PastRun, Score } from '../messages.js' */
+import type { PastRun, Score } from '../api_messages.js';
+import type { Reply } from '../messages.js';
 
-/** @returns {Promise<PastRun[]>} the latest first */
-export async function fetchRuns() {
-  return (await ask('/api/runs')).runs;
+/** @returns the latest first */
+export async function fetchRuns(): Promise<PastRun[]> {
+  return (await ask<{ runs: PastRun[] }>('/api/runs')).runs;
 }
 
-/**
- * @param {string} id of a run
- * @returns {Promise<Score>}
- */
-export function fetchScore(id) {
+/** @param id of a run */
+export function fetchScore(id: string): Promise<Score> {
   return ask(`/api/runs/score?id=${encodeURIComponent(id)}`);
 }
 
 /**
- * @param {string} id of a run
- * @returns {Promise<string>} what was done
+ * @param id of a run
+ * @returns what was done
  */
-export async function deleteRun(id) {
-  const reply = await ask('/api/runs/delete', {
+export async function deleteRun(id: string): Promise<string> {
+  const reply = await ask<Reply>('/api/runs/delete', {
     method: 'POST', body: JSON.stringify({ id }),
     headers: { ...OWN, 'Content-Type': 'application/json' },
   });
   return oneLine(reply.text);
 }
 
-/** @param {string} id of a run */
-export const pictureAddress = (id) => `/api/runs/picture?id=${encodeURIComponent(id)}`;
+/** @param id of a run */
+export const pictureAddress = (id: string) => `/api/runs/picture?id=${encodeURIComponent(id)}`;
 
-/** @param {string} id of a run */
-export const zipAddress = (id) => `/api/runs/zip?id=${encodeURIComponent(id)}`;
+/** @param id of a run */
+export const zipAddress = (id: string) => `/api/runs/zip?id=${encodeURIComponent(id)}`;
 
 /**
- * @param {string} id of a run
- * @param {string} name of one of its files
+ * @param id of a run
+ * @param name of one of its files
  */
-export const fileAddress = (id, name) => (
+export const fileAddress = (id: string, name: string) => (
   `/api/runs/file?id=${encodeURIComponent(id)}&file=${encodeURIComponent(name)}`);
 
-/** @param {string} id of a run */
-export const replayAddress = (id) => `/replay/${encodeURIComponent(id)}/`;
+/** @param id of a run */
+export const replayAddress = (id: string) => `/replay/${encodeURIComponent(id)}/`;
 
-/** @param {string[]} ids of runs */
-export const comparisonAddress = (ids) => (
+/** @param ids of runs */
+export const comparisonAddress = (ids: string[]) => (
   `/api/runs/comparison?ids=${ids.map(encodeURIComponent).join(',')}`);

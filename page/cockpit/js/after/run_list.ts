@@ -9,8 +9,8 @@ import { icon } from '../panels/icons.js';
 import * as api from './run_api.js';
 import { scoreBlock } from './score.js';
 
-/** @import { PastRun } from '../messages.js' */
-/** @import { Store } from '../store.js' */
+import type { PastRun } from '../api_messages.js';
+import type { Store } from '../store.js';
 
 const MOST_COMPARED = 6;
 const MEGA = 1e6;
@@ -25,17 +25,11 @@ class RunList {
   #compare = element('button', { type: 'button', class: 'wide', disabled: true,
     on: { click: () => this.#open(api.comparisonAddress([...this.#chosen])) } },
   'Compare the chosen runs');
-  /** @type {Set<string>} */
-  #chosen = new Set();
+  #chosen = new Set<string>();
   // By id, as shown, so that pictures are not requested again.
-  /** @type {Map<string, {text: string, node: HTMLElement}>} */
-  #items = new Map();
+  #items = new Map<string, { text: string; node: HTMLElement }>();
 
-  /**
-   * @param {HTMLElement} root
-   * @param {Store} store
-   */
-  constructor(root, store) {
+  constructor(root: HTMLElement, store: Store) {
     this.#store = store;
     this.#root = root;
     root.append(element('div', { class: 'stack' }, this.#compare, this.#error, this.#hint,
@@ -58,7 +52,7 @@ class RunList {
   /**
    * Fetch the list of runs from the server.
    *
-   * @param {string} [refusal] of an order, to be told meanwhile and with the new list
+   * @param refusal of an order, to be told meanwhile and with the new list
    */
   async refresh(refusal = '') {
     if (refusal) {
@@ -73,8 +67,7 @@ class RunList {
     }
   }
 
-  /** @param {PastRun[]} runs */
-  #show(runs) {
+  #show(runs: PastRun[]) {
     const known = new Map(runs.map((run) => [run.id, run]));
     for (const id of [...this.#chosen].filter((each) => !known.get(each)?.closed)) {
       this.#chosen.delete(id);
@@ -101,8 +94,7 @@ class RunList {
         : `Compare ${chosen} runs`);
   }
 
-  /** @param {PastRun} run */
-  #item(run) {
+  #item(run: PastRun) {
     const score = element('div', { class: 'run-score' });
     const title = run.title || run.scenario || run.name;
     return element('li', { class: 'card run', 'data-run': run.id, 'data-name': run.name },
@@ -122,21 +114,16 @@ class RunList {
       run.closed ? fileMenu(run) : null, score);
   }
 
-  /** @param {PastRun} run */
-  #choice(run) {
+  #choice(run: PastRun) {
     return element('input', { type: 'checkbox', 'aria-label': `Compare ${run.name}`,
       checked: this.#chosen.has(run.id), on: { change: (event) => {
-        const box = /** @type {HTMLInputElement} */ (event.currentTarget);
+        const box = event.currentTarget as HTMLInputElement;
         this.#chosen[box.checked ? 'add' : 'delete'](run.id);
         this.#count();
       } } });
   }
 
-  /**
-   * @param {PastRun} run
-   * @param {HTMLElement} score
-   */
-  #links(run, score) {
+  #links(run: PastRun, score: HTMLElement) {
     const report = run.files.find(({ name }) => name === 'report.html');
     return [
       button('replay', 'Replay', () => this.#open(api.replayAddress(run.id))),
@@ -146,16 +133,11 @@ class RunList {
     ].filter((item) => item !== null);
   }
 
-  /** @param {string} address */
-  #open(address) {
+  #open(address: string) {
     window.open(address, '_blank', 'noopener');
   }
 
-  /**
-   * @param {PastRun} run
-   * @param {HTMLElement} root
-   */
-  async #score(run, root) {
+  async #score(run: PastRun, root: HTMLElement) {
     if (root.firstElementChild) {
       root.replaceChildren();
       return;
@@ -169,8 +151,7 @@ class RunList {
     }
   }
 
-  /** @param {PastRun} run */
-  async #delete(run) {
+  async #delete(run: PastRun) {
     const megabytes = (run.bytes / MEGA).toFixed(1);
     if (!await confirm(`Delete ${run.name}?`, `${plural(run.files.length, 'file')}, ${megabytes} `
       + 'MB: recording, scenario and reports. They cannot be brought back.', 'Delete')) {
@@ -186,8 +167,7 @@ class RunList {
   }
 }
 
-/** @param {PastRun} run */
-function facts({ name, began_ms, duration_s, contacts, closed, bytes }) {
+function facts({ name, began_ms, duration_s, contacts, closed, bytes }: PastRun) {
   return [
     began_ms === null ? '' : new Date(began_ms).toLocaleString(),
     closed ? '' : 'being recorded', duration_s === null ? '' : clockTime(duration_s),
@@ -196,8 +176,7 @@ function facts({ name, began_ms, duration_s, contacts, closed, bytes }) {
   ].filter(Boolean).join(' · ');
 }
 
-/** @param {PastRun} run */
-function fileMenu({ id, files }) {
+function fileMenu({ id, files }: PastRun) {
   return element('details', { class: 'run-files' }, element('summary', { text: 'Download' }),
     element('ul', {},
       element('li', {}, element('a', { href: api.zipAddress(id), download: true,
@@ -207,22 +186,15 @@ function fileMenu({ id, files }) {
         element('span', { class: 'dim', text: ` ${(bytes / MEGA).toFixed(2)} MB` })))));
 }
 
-/**
- * @param {string} action
- * @param {string} text
- * @param {() => void} act
- */
-function button(action, text, act) {
+function button(action: string, text: string, act: () => void) {
   return element('button', { type: 'button', 'data-action': action, text, on: { click: act } });
 }
 
 /**
  * Create the panel, which fetches the list when it is shown.
  *
- * @param {HTMLElement} root #panel-runs
- * @param {Store} store
- * @returns {RunList}
+ * @param root #panel-runs
  */
-export function createRunList(root, store) {
+export function createRunList(root: HTMLElement, store: Store): RunList {
   return new RunList(root, store);
 }

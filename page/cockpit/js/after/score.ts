@@ -5,24 +5,20 @@
 import { element } from '../dom.js';
 import { fixed } from '../panels/format.js';
 
-/** @import { Score, VehicleScore } from '../messages.js' */
+import type { Score, VehicleScore } from '../api_messages.js';
 
 const KMH = 3.6;
 
-/**
- * The state of a score: being computed, the score, or why there is none.
- *
- * @typedef {{state: 'waiting'}|{state: 'told', score: Score}|{state: 'none', why: string}} Scored
- */
+/** The state of a score: being computed, the score, or why there is none. */
+export type Scored = { state: 'waiting' } | { state: 'told'; score: Score }
+  | { state: 'none'; why: string };
 
 /**
  * Build the table of scores.
  *
- * @param {Scored} scored
- * @param {string|null} mine the vehicle that this page drives, shown first
- * @returns {HTMLElement}
+ * @param mine the vehicle that this page drives, shown first
  */
-export function scoreBlock(scored, mine) {
+export function scoreBlock(scored: Scored, mine: string | null): HTMLElement {
   const root = element('section', { class: 'score', 'aria-label': 'Score',
     'data-state': scored.state });
   if (scored.state === 'waiting') {
@@ -34,19 +30,17 @@ export function scoreBlock(scored, mine) {
     }));
   } else {
     const { vehicles } = scored.score;
-    /** @param {VehicleScore} each */
-    const rank = ({ vehicle, role }) => (vehicle === mine ? 0 : role === 'human' ? 1 : 2);
+    const rank = (
+      { vehicle, role }: VehicleScore) => (vehicle === mine ? 0 : role === 'human' ? 1 : 2);
     const [first, ...others] = [...vehicles].sort((a, b) => rank(a) - rank(b));
     root.append(vehicleScore(first, true), ...others.map((each) => vehicleScore(each, false)));
   }
   return root;
 }
 
-/**
- * @param {VehicleScore} scored
- * @param {boolean} open whether its parts are shown at once
- */
-function vehicleScore({ vehicle, role, score, parts, distance, fastest, remarks }, open) {
+/** @param open whether its parts are shown at once */
+function vehicleScore({ vehicle, role, score, parts, distance, fastest, remarks }: VehicleScore,
+  open: boolean) {
   const points = score === null ? '–' : fixed(100 * score, 0);
   return element('details', { class: 'score-vehicle', open, 'data-vehicle': vehicle },
     element('summary', { title: 'Multipliers times the weighted mean, as nuPlan scores a drive' },

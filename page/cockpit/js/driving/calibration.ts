@@ -9,11 +9,10 @@ import { connectedPads } from './gamepad.js';
 import { loadProfile, sampleOf } from './gamepad_profile.js';
 import { RawBars } from './raw_bars.js';
 
-/** @import { CalibrationStep } from './calibration_run.js' */
-/** @import { Profile, Sample } from './gamepad_profile.js' */
+import type { CalibrationStep } from './calibration_run.js';
+import type { Profile, Sample } from './gamepad_profile.js';
 
-/** @type {Record<CalibrationStep, [title: string, instruction: string]>} */
-const TEXTS = {
+const TEXTS: Record<CalibrationStep, [title: string, instruction: string]> = {
   centre: ['Rest', 'Hold the wheel or stick straight, take your feet off the pedals, then press '
     + 'Next.'],
   left: ['Left', 'Turn fully left, then back to straight.'],
@@ -34,13 +33,10 @@ const TEXTS = {
 /** One dialog, opened for one device after the other. */
 export class CalibrationDialog {
   #save;
-  /** @type {Gamepad|null} */
-  #pad = null;
-  /** @type {CalibrationRun|null} */
-  #run = null;
+  #pad: Gamepad | null = null;
+  #run: CalibrationRun | null = null;
   #frame = 0;
-  /** @type {RawBars|null} */
-  #bars = null;
+  #bars: RawBars | null = null;
   #test = new CalibrationTest();
   #heading = element('h2', { id: 'calibration-title' });
   #steps = STEPS.map((step) => element('li', { text: TEXTS[step][0] }));
@@ -57,17 +53,14 @@ export class CalibrationDialog {
     this.#button('Use the default mapping', () => this.#close(null)),
     this.#button('Cancel', () => this.#dialog.close()), this.#skip, this.#next));
 
-  /**
-   * @param {(index: number, profile: Profile|null) => void} save
-   * called with the index of the device and its new mapping, null for the default
-   */
-  constructor(save) {
+  /** @param save called with the index of the device and its new mapping, null for the default */
+  constructor(save: (index: number, profile: Profile | null) => void) {
     this.#save = save;
     document.body.append(this.#dialog);
   }
 
-  /** @param {number} index of the device to calibrate */
-  open(index) {
+  /** @param index of the device to calibrate */
+  open(index: number) {
     this.#pad = connectedPads().find((pad) => pad.index === index) ?? null;
     if (this.#pad === null || this.#dialog.open) {
       return;
@@ -81,8 +74,7 @@ export class CalibrationDialog {
     this.#poll(performance.now());
   }
 
-  /** @param {number} now_ms */
-  #poll(now_ms) {
+  #poll(now_ms: number) {
     const pad = connectedPads().find(({ index }) => index === this.#pad?.index);
     if (pad === undefined) {
       setText(this.#instruction, 'The device is unplugged. Plug it in again and press a button.');
@@ -95,11 +87,7 @@ export class CalibrationDialog {
     this.#frame = requestAnimationFrame((at_ms) => this.#poll(at_ms));
   }
 
-  /**
-   * @param {Sample} sample
-   * @param {CalibrationRun} run
-   */
-  #show(sample, run) {
+  #show(sample: Sample, run: CalibrationRun) {
     const { step, found } = run;
     const testing = step === 'test';
     this.#steps.forEach((item, i) => {
@@ -125,8 +113,7 @@ export class CalibrationDialog {
     }
   }
 
-  /** @param {Profile|null} profile */
-  #close(profile) {
+  #close(profile: Profile | null) {
     if (this.#pad !== null) {
       this.#save(this.#pad.index, profile);
     }
@@ -138,12 +125,7 @@ export class CalibrationDialog {
     this.#test.show(null);
   }
 
-  /**
-   * @param {string} text
-   * @param {() => void} act
-   * @param {string} [kind]
-   */
-  #button(text, act, kind = '') {
+  #button(text: string, act: () => void, kind = '') {
     return element('button', { type: 'button', class: `drive-button ${kind}`, text,
       on: { click: act } });
   }

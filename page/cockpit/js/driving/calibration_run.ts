@@ -8,26 +8,21 @@
 
 import { LIGHT_BUTTONS } from '../lights.js';
 
-/** @import { Control, LightButtons, Profile, Sample } from './gamepad_profile.js' */
+import type { Control, LightButtons, Profile, Sample } from './gamepad_profile.js';
 
-/**
- * The steering's axis at its left end, as measured in its step.
- *
- * @typedef {Place & {centre: number, end: number}} LeftEnd
- */
+/** The steering's axis at its left end, as measured in its step. */
+export interface LeftEnd extends Place { centre: number; end: number }
 
-/**
- * @typedef {'centre'|'left'|'right'|'throttle'|'brake'|'reverse'|'put_back'|'test'
- *   |typeof LIGHT_BUTTONS[number]} CalibrationStep
- * @typedef {Control['kind']} Kind
- * @typedef {{kind: Kind, index: number}} Place of an axis or button
- */
+export type CalibrationStep = 'centre' | 'left' | 'right' | 'throttle' | 'brake' | 'reverse'
+  | 'put_back' | 'test' | typeof LIGHT_BUTTONS[number];
+export type Kind = Control['kind'];
+export interface Place { kind: Kind; index: number } // of an axis or button
 
 /** The steps in their order. */
-export const STEPS = Object.freeze(/** @type {CalibrationStep[]} */ ([
+export const STEPS: readonly CalibrationStep[] = Object.freeze([
   'centre', 'left', 'right', 'throttle', 'brake', 'reverse', ...LIGHT_BUTTONS, 'put_back',
   'test',
-]));
+]);
 
 // A smaller movement of an axis or button does not count.
 const LEAST_SPAN = 0.3;
@@ -40,32 +35,25 @@ const MADE_UP = 0.5;
 
 /** One run through the steps. */
 export class CalibrationRun {
-  /** @type {Sample|null} */
-  #start = null;
-  /** @type {Sample|null} */
-  #first = null;
-  /** @type {Sample|null} */
-  #low = null;
-  /** @type {Sample|null} */
-  #high = null;
-  /** @type {Sample|null} */
-  #sample = null;
-  /** @type {Sample|null} */
-  #centre = null;
-  /** @type {LeftEnd|null} */
-  #left = null;
+  #start: Sample | null = null;
+  #first: Sample | null = null;
+  #low: Sample | null = null;
+  #high: Sample | null = null;
+  #sample: Sample | null = null;
+  #centre: Sample | null = null;
+  #left: LeftEnd | null = null;
   #backSince_ms = NaN;
+  profile;
+  step;
 
-  /**
-   * @param {Profile} profile kept by skipped steps
-   */
-  constructor(profile) {
+  /** @param profile kept by skipped steps */
+  constructor(profile: Profile) {
     this.profile = structuredClone(profile);
     this.step = STEPS[0];
   }
 
-  /** @returns {(Place & {span: number})|null} the control that is moved in this step */
-  get found() {
+  /** @returns the control that is moved in this step */
+  get found(): (Place & { span: number }) | null {
     return this.#sample && this.#asksForMovement ? this.#largest() : null;
   }
 
@@ -76,11 +64,9 @@ export class CalibrationRun {
   /**
    * Add a sample; a step ends by itself when the moved control is back at rest.
    *
-   * @param {Sample} sample
-   * @param {number} now_ms
-   * @returns {boolean} whether the step ended
+   * @returns whether the step ended
    */
-  feed(sample, now_ms) {
+  feed(sample: Sample, now_ms: number): boolean {
     this.#sample = sample;
     this.#start ??= sample;
     this.#first = merged((before, start, now) => (before === start ? now : before),
@@ -101,9 +87,9 @@ export class CalibrationRun {
   /**
    * End this step with what was measured.
    *
-   * @returns {boolean} false when nothing that fits has been moved yet
+   * @returns false when nothing that fits has been moved yet
    */
-  next() {
+  next(): boolean {
     if (this.step === 'test' || this.#sample === null) {
       return false;
     }
@@ -135,8 +121,7 @@ export class CalibrationRun {
     this.#backSince_ms = NaN;
   }
 
-  /** @param {Place} place */
-  #keep({ kind, index }) {
+  #keep({ kind, index }: Place) {
     const [low, high] = [this.#low, this.#high].map((sample) => valueOf(sample, kind, index));
     if (this.step === 'left') {
       const centre = valueOf(this.#centre, kind, index);
@@ -160,28 +145,19 @@ export class CalibrationRun {
     }
   }
 
-  /**
-   * Remove a button from its other functions: a calibrated button has only one.
-   *
-   * @param {number} index
-   */
-  #free(index) {
+  /** Remove a button from its other functions: a calibrated button has only one. */
+  #free(index: number) {
     const { reverse, lights, put_back } = this.profile;
     this.profile.put_back = put_back.filter((button) => button !== index);
-    for (const group of [reverse, lights]) {
+    for (const group of [reverse, lights] as Record<string, number[]>[]) {
       for (const [name, buttons] of Object.entries(group)) {
         Object.assign(group, { [name]: buttons.filter((button) => button !== index) });
       }
     }
   }
 
-  /**
-   * @param {number} low
-   * @param {number} high
-   * @returns {Control}
-   */
-  #steering(low, high) {
-    const { kind, index, end: left, centre } = /** @type {LeftEnd} */ (this.#left);
+  #steering(low: number, high: number): Control {
+    const { kind, index, end: left, centre } = this.#left as LeftEnd;
     const right = farther(low, high, left);
     const [min, max] = [Math.min(left, right), Math.max(left, right)];
     const share = (centre - min) / (max - min);
@@ -189,12 +165,9 @@ export class CalibrationRun {
       invert: left > right, deadzone: DEADZONE };
   }
 
-  /** @returns {(Place & {span: number})|null} */
-  #largest() {
-    /** @type {(Place & {span: number})|null} */
-    let best = null;
-    /** @type {Kind[]} */
-    const kinds = isButton(this.step) ? ['button'] : ['axis', 'button'];
+  #largest(): (Place & { span: number }) | null {
+    let best: (Place & { span: number }) | null = null;
+    const kinds: Kind[] = isButton(this.step) ? ['button'] : ['axis', 'button'];
     for (const kind of kinds) {
       for (const index of listOf(this.#sample, kind).keys()) {
         const span = valueOf(this.#high, kind, index) - valueOf(this.#low, kind, index);
@@ -206,15 +179,9 @@ export class CalibrationRun {
     return best;
   }
 
-  /**
-   * @param {Kind} kind
-   * @param {number} index
-   */
-  #isFree(kind, index) {
+  #isFree(kind: Kind, index: number) {
     const { steering, throttle } = this.profile;
-    /** @param {Place|null} control */
-    /** @param {Place|null} control */
-    const is = (control) => control?.kind === kind && control.index === index;
+    const is = (control: Place | null) => control?.kind === kind && control.index === index;
     switch (this.step) {
       case 'left': return kind === 'axis';
       case 'right': return is(this.#left);
@@ -225,8 +192,7 @@ export class CalibrationRun {
     }
   }
 
-  /** @param {Control} throttle */
-  #isOpposite(throttle) {
+  #isOpposite(throttle: Control) {
     const { kind, index } = throttle;
     const rest = throttle.invert ? throttle.max : throttle.min;
     const up = valueOf(this.#high, kind, index) - rest;
@@ -234,8 +200,7 @@ export class CalibrationRun {
     return throttle.invert ? up > down : down > up;
   }
 
-  /** @param {Place} place */
-  #isBack({ kind, index }) {
+  #isBack({ kind, index }: Place) {
     const low = valueOf(this.#low, kind, index);
     const high = valueOf(this.#high, kind, index);
     const rest = this.#rest(kind, index);
@@ -243,13 +208,8 @@ export class CalibrationRun {
     return Math.abs(valueOf(this.#sample, kind, index) - rest) < BACK_SHARE * far;
   }
 
-  /**
-   * Return where a control stands at rest.
-   *
-   * @param {Kind} kind
-   * @param {number} index
-   */
-  #rest(kind, index) {
+  /** Return where a control stands at rest. */
+  #rest(kind: Kind, index: number) {
     if (this.step === 'left' || this.step === 'right') {
       return valueOf(this.#centre, kind, index);
     }
@@ -261,60 +221,31 @@ export class CalibrationRun {
   }
 }
 
-/**
- * @param {CalibrationStep} step
- * @returns {step is keyof LightButtons}
- */
-function isLight(step) {
+function isLight(step: CalibrationStep): step is keyof LightButtons {
   return LIGHT_BUTTONS.some((name) => name === step);
 }
 
-/**
- * @param {CalibrationStep} step
- * @returns {boolean} whether it asks for a button
- */
-function isButton(step) {
+/** @returns whether it asks for a button */
+function isButton(step: CalibrationStep): boolean {
   return step === 'reverse' || step === 'put_back' || isLight(step);
 }
 
-/**
- * @param {Sample|null} sample
- * @param {Kind} kind
- * @returns {number[]}
- */
-function listOf(sample, kind) {
+function listOf(sample: Sample | null, kind: Kind): number[] {
   return (kind === 'axis' ? sample?.axes : sample?.buttons) ?? [];
 }
 
-/**
- * @param {Sample|null} sample
- * @param {Kind} kind
- * @param {number} index
- */
-function valueOf(sample, kind, index) {
+function valueOf(sample: Sample | null, kind: Kind, index: number) {
   return listOf(sample, kind)[index] ?? 0;
 }
 
-/**
- * @param {number} low
- * @param {number} high
- * @param {number} from
- */
-function farther(low, high, from) {
+function farther(low: number, high: number, from: number) {
   return Math.abs(low - from) > Math.abs(high - from) ? low : high;
 }
 
-/**
- * Combine samples value by value.
- *
- * @param {(...values: number[]) => number} combine
- * @param {...Sample} samples
- * @returns {Sample}
- */
-function merged(combine, ...samples) {
-  const last = /** @type {Sample} */ (samples.at(-1));
-  /** @param {'axes'|'buttons'} name */
-  const each = (name) => last[name].map(
+/** Combine samples value by value. */
+function merged(combine: (...values: number[]) => number, ...samples: Sample[]): Sample {
+  const last = samples.at(-1) as Sample;
+  const each = (name: 'axes' | 'buttons') => last[name].map(
     (value, i) => combine(...samples.map((sample) => sample[name][i] ?? value)));
   return { axes: each('axes'), buttons: each('buttons') };
 }

@@ -7,22 +7,21 @@ import { gearAfter, pedalValue, steeringValue } from './gamepad_profile.js';
 import { PedalBar, SteeringBar } from './gauges.js';
 import { SteeringWheel } from './steering_wheel.js';
 
-/** @import { Control, Profile, Sample } from './gamepad_profile.js' */
+import type { Control, Profile, Sample } from './gamepad_profile.js';
 
-/** @typedef {'steering'|'throttle'|'brake'} ControlName */
+export type ControlName = 'steering' | 'throttle' | 'brake';
 
-/** @type {Record<ControlName, string>} */
-const NAMES = { steering: 'Steering', throttle: 'Throttle', brake: 'Brake' };
-const CONTROLS = /** @type {ControlName[]} */ (Object.keys(NAMES));
+const NAMES: Record<ControlName, string> = {
+  steering: 'Steering', throttle: 'Throttle', brake: 'Brake',
+};
+const CONTROLS = Object.keys(NAMES) as ControlName[];
 const MOST_DEADZONE = 0.3;
 
 /** A view of a profile at work; `node` goes into the dialog. */
 export class CalibrationTest {
-  /** @type {Profile|null} */
-  #profile = null;
+  #profile: Profile | null = null;
   #reverse = false;
-  /** @type {boolean[]} */
-  #pressed = [];
+  #pressed: boolean[] = [];
   #wheel = new SteeringWheel();
   #bars = {
     steering: new SteeringBar(), throttle: new PedalBar('throttle', 'Throttle'),
@@ -30,6 +29,7 @@ export class CalibrationTest {
   };
   #gear = element('span', { class: 'hud-gear', text: 'D' });
   #tuning = element('div', { class: 'tuning' });
+  node;
 
   constructor() {
     const { steering, throttle, brake } = this.#bars;
@@ -42,10 +42,9 @@ export class CalibrationTest {
   /**
    * Show the effect of a sample.
    *
-   * @param {Profile|null} profile null hides this view
-   * @param {Sample} [sample]
+   * @param profile null hides this view
    */
-  show(profile, sample) {
+  show(profile: Profile | null, sample?: Sample) {
     setAttribute(this.node, 'hidden', profile === null);
     if (profile !== this.#profile) {
       this.#profile = profile;
@@ -59,15 +58,11 @@ export class CalibrationTest {
     }
   }
 
-  /**
-   * @param {Profile} profile
-   * @param {Sample} sample
-   */
-  #move(profile, sample) {
+  #move(profile: Profile, sample: Sample) {
     const steering = steeringValue(sample, profile.steering);
     this.#wheel.turn(steering);
     this.#bars.steering.show(steering, false, false);
-    for (const name of /** @type {const} */ (['throttle', 'brake'])) {
+    for (const name of ['throttle', 'brake'] as const) {
       const value = pedalValue(sample, profile[name]);
       this.#bars[name].show(value, false);
       this.#bars[name].write(value);
@@ -82,11 +77,7 @@ export class CalibrationTest {
     setAttribute(this.#gear, 'data-gear', this.#reverse ? 'R' : 'D');
   }
 
-  /**
-   * @param {ControlName} name
-   * @param {Control} control
-   */
-  #row(name, control) {
+  #row(name: ControlName, control: Control) {
     const shown = element('output', { text: percent(control.deadzone) });
     const range = element('input', { type: 'range', min: 0, max: MOST_DEADZONE, step: 0.01,
       value: control.deadzone, 'aria-label': `Dead zone of ${NAMES[name]}` });
@@ -107,7 +98,6 @@ export class CalibrationTest {
   }
 }
 
-/** @param {number} share */
-function percent(share) {
+function percent(share: number) {
   return `${Math.round(100 * share)} %`;
 }

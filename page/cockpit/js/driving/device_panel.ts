@@ -4,19 +4,17 @@
 
 import { element } from '../dom.js';
 
-/** @import { Gamepads } from './gamepad.js' */
+import type { Gamepads } from './gamepad.js';
 
 /** A section of the panel; `node` goes into the page. */
 export class DevicePanel {
   #gamepads;
   #calibrate;
   #list = element('ul', { class: 'devices' });
+  node;
 
-  /**
-   * @param {Gamepads} gamepads
-   * @param {(index: number) => void} calibrate opens the dialog for a device
-   */
-  constructor(gamepads, calibrate) {
+  /** @param calibrate opens the dialog for a device */
+  constructor(gamepads: Gamepads, calibrate: (index: number) => void) {
     this.#gamepads = gamepads;
     this.#calibrate = calibrate;
     this.node = element('section', { class: 'drive-section', 'aria-labelledby': 'devices-title' },
@@ -38,14 +36,8 @@ export class DevicePanel {
         () => this.#gamepads.choose(device.index), device.index)));
   }
 
-  /**
-   * @param {string} name
-   * @param {string} note
-   * @param {boolean} active
-   * @param {() => void} choose
-   * @param {number|null} [index]
-   */
-  #row(name, note, active, choose, index = null) {
+  #row(name: string, note: string, active: boolean, choose: () => void,
+    index: number | null = null) {
     return element('li', { class: 'device', 'data-active': active },
       element('button', { type: 'button', class: 'device-choose', 'aria-pressed': String(active),
         title: `Drive with ${name}`, on: { click: choose } },
@@ -59,10 +51,9 @@ export class DevicePanel {
 /**
  * Shorten the name of a gamepad in browsers.
  *
- * @param {string} id such as 'Wheel (Vendor: 046d Product: c24f)'
- * @returns {string}
+ * @param id such as 'Wheel (Vendor: 046d Product: c24f)'
  */
-export function shortName(id) {
+export function shortName(id: string): string {
   return id.replace(/\s*\([^)]*Vendor:[^)]*\)/i, '').replace(/^[0-9a-f]{4}-[0-9a-f]{4}-/i, '')
     .trim() || 'Gamepad';
 }

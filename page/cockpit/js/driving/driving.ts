@@ -15,9 +15,9 @@ import { PutBackNotice } from './put_back_notice.js';
 import { describeSeat } from './seat_text.js';
 import { InputSender } from './sender.js';
 
-/** @import { Connection } from '../connection.js' */
-/** @import { Hands, Reply } from '../messages.js' */
-/** @import { Store } from '../store.js' */
+import type { Connection } from '../connection.js';
+import type { Hands, Reply } from '../messages.js';
+import type { Store } from '../store.js';
 
 // How long the button keeps asking: a moving vehicle may free a place meanwhile [ms].
 const PUT_BACK_MS = 500;
@@ -27,8 +27,7 @@ export class Driving {
   #store;
   #connection;
   #sender;
-  /** @type {DevicePanel|null} */
-  #devicePanel = null;
+  #devicePanel: DevicePanel | null = null;
   #reverse = false;
   // After the driving device was unplugged, nothing moves before the driver moves a control.
   #unplugged = false;
@@ -36,13 +35,14 @@ export class Driving {
   #lost = '';
   #sentDevice = '';
   #putBackNotice;
+  focus;
+  keyboard;
+  gamepads;
+  calibration;
+  hud;
 
-  /**
-   * @param {HTMLElement} root `#hud`, or an ancestor of it
-   * @param {Store} store
-   * @param {Connection} connection
-   */
-  constructor(root, store, connection) {
+  /** @param root `#hud`, or an ancestor of it */
+  constructor(root: HTMLElement, store: Store, connection: Connection) {
     this.#store = store;
     this.#connection = connection;
     this.#putBackNotice = new PutBackNotice(store);
@@ -76,18 +76,18 @@ export class Driving {
     this.#updateSeat();
   }
 
-  /** @returns {string|null} the seat that this page drives */
-  get seat() {
+  /** @returns the seat that this page drives */
+  get seat(): string | null {
     return this.#sender?.seat ?? null;
   }
 
-  /** @returns {string|null} why the controls are released, null while they are in use */
-  get away() {
+  /** @returns why the controls are released, null while they are in use */
+  get away(): string | null {
     return this.focus.reason ?? (this.#unplugged ? 'unplugged' : null);
   }
 
-  /** @returns {Hands} the driver's inputs, as in an input message */
-  get hands() {
+  /** @returns the driver's inputs, as in an input message */
+  get hands(): Hands {
     if (this.away !== null) {
       return { away: true };
     }
@@ -100,30 +100,21 @@ export class Driving {
     return axes === null ? { keys: this.keyboard.keys, ...rest } : { axes, ...rest };
   }
 
-  /** @returns {HTMLElement} the list of input devices, for the Drive panel */
-  get devices() {
-    return /** @type {DevicePanel} */ (this.#devicePanel).node;
+  /** @returns the list of input devices, for the Drive panel */
+  get devices(): HTMLElement {
+    return (this.#devicePanel as DevicePanel).node;
   }
 
-  /**
-   * Take a seat and give back the former one.
-   *
-   * @param {string} seat
-   * @returns {Promise<Reply>}
-   */
-  async claim(seat) {
+  /** Take a seat and give back the former one. */
+  async claim(seat: string): Promise<Reply> {
     if (this.seat !== null && this.seat !== seat) {
       await this.release();
     }
     return this.#connection.request({ type: 'claim', seat, device: this.device });
   }
 
-  /**
-   * Release the controls at once, and give the seat back.
-   *
-   * @returns {Promise<Reply>}
-   */
-  async release() {
+  /** Release the controls at once, and give the seat back. */
+  async release(): Promise<Reply> {
     const { seat } = this;
     this.#leaveSeat();
     const reply = await this.#connection.request({ type: 'release', seat: seat ?? '' });
@@ -143,7 +134,7 @@ export class Driving {
     return active ? shortName(active.id).slice(0, 60) : 'Keyboard';
   }
 
-  /** @param {boolean} [anew] send it even if the server has it already */
+  /** @param anew send it even if the server has it already */
   #sendDevice(anew = false) {
     if (anew || this.device !== this.#sentDevice) {
       this.#sentDevice = this.device;
@@ -151,8 +142,7 @@ export class Driving {
     }
   }
 
-  /** @param {boolean} connected */
-  #connectionChanged(connected) {
+  #connectionChanged(connected: boolean) {
     if (connected) {
       this.#lost = '';
     } else if (this.#lost === '') {
@@ -174,8 +164,7 @@ export class Driving {
     }
   }
 
-  /** @param {string} seat */
-  #enterSeat(seat) {
+  #enterSeat(seat: string) {
     this.#unplugged = false;
     this.#reverse = this.#gearOf(seat) || this.gamepads.gateHeld;
     this.keyboard.release();
@@ -197,34 +186,27 @@ export class Driving {
     }
   }
 
-  /**
-   * Return the gear of a vehicle, which a new driver keeps.
-   *
-   * @param {string} seat
-   */
-  #gearOf(seat) {
+  /** Return the gear of a vehicle, which a new driver keeps. */
+  #gearOf(seat: string) {
     const row = this.#store.vehicleIndex(seat) * VEHICLE_WIDTH;
     return (this.#store.latest?.vehicles[row + VEHICLE.reverse] ?? NaN) > 0.5;
   }
 
-  /** @param {string|null} reason */
-  #focusChanged(reason) {
+  #focusChanged(reason: string | null) {
     if (reason !== null) {
       this.keyboard.release();
     }
     this.#sender?.update();
   }
 
-  /** @param {boolean} really */
-  #moved(really) {
+  #moved(really: boolean) {
     if (really) {
       this.#unplugged = false;
     }
     this.#sender?.update();
   }
 
-  /** @param {boolean} reverse */
-  #setReverse(reverse) {
+  #setReverse(reverse: boolean) {
     // A lever moved while the page has no focus counts; buttons pressed in calibration do not.
     if (this.seat !== null && this.focus.reason !== 'dialog' && reverse !== this.#reverse) {
       this.#reverse = reverse;
@@ -245,8 +227,7 @@ export class Driving {
     };
   }
 
-  /** @param {string|null} id */
-  #driverOf(id) {
+  #driverOf(id: string | null) {
     const { seats, scene, me, connected, mode } = this.#store;
     const { active } = this.gamepads;
     if (this.seat !== null) {
@@ -265,15 +246,8 @@ export class Driving {
   }
 }
 
-/**
- * Put the instruments, the seats and the input devices into the page.
- *
- * @param {HTMLElement} root
- * @param {Store} store
- * @param {Connection} connection
- * @returns {Driving}
- */
-export function createDriving(root, store, connection) {
+/** Put the instruments, the seats and the input devices into the page. */
+export function createDriving(root: HTMLElement, store: Store, connection: Connection): Driving {
   const driving = new Driving(root, store, connection);
   createSeats(part(root, 'panel-drive'), store, connection, driving);
   return driving;

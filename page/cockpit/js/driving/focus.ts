@@ -2,18 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The check whether the driver's inputs can act on this page right now. */
 
-/** @import { Store } from '../store.js' */
+import type { Store } from '../store.js';
 
 const EDITABLE = 'input:not([type=checkbox]):not([type=radio]):not([type=button]),'
   + 'select, textarea, [contenteditable=""], [contenteditable=true]';
 
-/**
- * Return whether an element uses the keys that are pressed at it.
- *
- * @param {EventTarget|null} target
- * @returns {boolean}
- */
-export function isTyping(target) {
+/** Return whether an element uses the keys that are pressed at it. */
+export function isTyping(target: EventTarget | null): boolean {
   return target instanceof Element && target.closest(EDITABLE) !== null;
 }
 
@@ -23,30 +18,29 @@ export class Focus {
   #changed;
   #gone = false;
   #focused = document.hasFocus();
+  /**
+   * Null while the controls may act, else why they may not: 'connection', 'hidden', 'focus' or
+   * 'dialog'.
+   */
+  reason;
 
   /**
-   * @param {Store} store its `connected` counts
-   * @param {(reason: string|null) => void} changed called at once at each change of `reason`
+   * @param store its `connected` counts
+   * @param changed called at once at each change of `reason`
    */
-  constructor(store, changed) {
+  constructor(store: Store, changed: (reason: string | null) => void) {
     this.#store = store;
     this.#changed = changed;
-    /**
-     * Null while the controls may act, else why they may not: 'connection', 'hidden', 'focus' or
-     * 'dialog'.
-     */
     this.reason = this.#why();
     this.#listen();
   }
 
   #listen() {
-    /** @param {boolean} value */
-    const focused = (value) => () => {
+    const focused = (value: boolean) => () => {
       this.#focused = value;
       this.#update();
     };
-    /** @param {boolean} value */
-    const gone = (value) => () => {
+    const gone = (value: boolean) => () => {
       this.#gone = value;
       this.#update();
     };

@@ -7,7 +7,7 @@ import {
   gearAfter, loadProfile, pedalValue, sampleOf, saveProfile, steeringValue,
 } from './gamepad_profile.js';
 
-/** @import { Control, Profile } from './gamepad_profile.js' */
+import type { Control, Profile } from './gamepad_profile.js';
 
 // A larger change of any axis or button is intended and not sensor noise.
 const MEANT = 0.2;
@@ -15,12 +15,19 @@ const MEANT = 0.2;
 // was plugged in, browsers report 0, which is half of a wheel's pedal travel.
 const AT_REST = 0.1;
 const STEPS = 1000;
-const PEDALS = /** @type {const} */ (['throttle', 'brake']);
+const PEDALS = ['throttle', 'brake'] as const;
 
 /** One connected device with its mapping. */
 class Device {
-  /** @param {Gamepad} pad */
-  constructor(pad) {
+  id;
+  index;
+  baseline;
+  sample;
+  rested;
+  profile;
+  calibrated;
+
+  constructor(pad: Gamepad) {
     this.id = pad.id;
     this.index = pad.index;
     this.baseline = sampleOf(pad);
@@ -31,12 +38,8 @@ class Device {
     this.calibrated = calibrated;
   }
 
-  /**
-   * Read the values of this frame.
-   *
-   * @param {Gamepad} pad
-   */
-  read(pad) {
+  /** Read the values of this frame. */
+  read(pad: Gamepad) {
     this.sample = sampleOf(pad);
     for (const name of PEDALS) {
       this.rested[name] ||= pedalValue(this.sample, this.profile[name]) < AT_REST;
@@ -45,8 +48,8 @@ class Device {
 
   /** Return whether a control was clearly moved since the device was connected. */
   get moved() {
-    /** @type {(values: number[], base: number[]) => boolean} */
-    const differs = (values, base) => values.some((v, i) => Math.abs(v - (base[i] ?? 0)) > MEANT);
+    const differs = (values: number[],
+      base: number[]): boolean => values.some((v, i) => Math.abs(v - (base[i] ?? 0)) > MEANT);
     return differs(this.sample.axes, this.baseline.axes)
       || differs(this.sample.buttons, this.baseline.buttons);
   }
@@ -54,8 +57,7 @@ class Device {
   /** Return throttle, brake and steering after calibration. */
   get axes() {
     const { throttle, brake, steering } = this.profile;
-    /** @type {(name: 'throttle'|'brake', control: Control) => number} */
-    const pedal = (name, control) => (
+    const pedal = (name: 'throttle' | 'brake', control: Control): number => (
       this.rested[name] ? pedalValue(this.sample, control) : 0);
     return [pedal('throttle', throttle), pedal('brake', brake),
       steeringValue(this.sample, steering)].map((v) => Math.round(v * STEPS) / STEPS);
@@ -64,66 +66,63 @@ class Device {
 
 /** All connected devices; polled in every animation frame while there is one. */
 export class Gamepads {
-  /** @type {Map<number, Device>} */
-  #devices = new Map();
-  /** @type {Device|null} */
-  #active = null;
-  /** @type {boolean[]} */
-  #pressed = [];
+  #devices = new Map<number, Device>();
+  #active: Device | null = null;
+  #pressed: boolean[] = [];
   #report;
   #frame = 0;
   #last = '';
 
   /**
-   * @param {{changed: () => void, gear: (change: (reverse: boolean) => boolean) => void,
-   *   unplugged: () => void, listed: () => void}} report `changed` when the inputs
-   *   of the active device change, `gear` when one of its gear buttons changed, `unplugged` when
-   *   it is gone, `listed` when the list or the choice of devices changed
+   * @param report `changed` when the inputs of the active device change, `gear` when one of its
+   *   gear buttons changed, `unplugged` when it is gone, `listed` when the list or the choice of
+   *   devices changed
    */
-  constructor(report) {
+  constructor(report: { changed: () => void; gear: (change: (reverse: boolean) => boolean) => void;
+    unplugged: () => void; listed: () => void }) {
     this.#report = report;
     window.addEventListener('gamepadconnected', () => this.#poll());
     window.addEventListener('gamepaddisconnected', () => this.#poll());
     this.#poll();
   }
 
-  /** @returns {Device[]} the connected devices */
-  get devices() {
+  /** @returns the connected devices */
+  get devices(): Device[] {
     return [...this.#devices.values()];
   }
 
-  /** @returns {Device|null} the device that drives when no key is held */
-  get active() {
+  /** @returns the device that drives when no key is held */
+  get active(): Device | null {
     return this.#active;
   }
 
-  /** @returns {number[]|null} throttle, brake and steering of the active device */
-  get axes() {
+  /** @returns throttle, brake and steering of the active device */
+  get axes(): number[] | null {
     return this.#active?.axes ?? null;
   }
 
-  /** @returns {number[]} left and right indicator, hazard, horn: 1 while a button of it is held */
-  get lights() {
+  /** @returns left and right indicator, hazard, horn: 1 while a button of it is held */
+  get lights(): number[] {
     return LIGHT_BUTTONS.map((name) => Number(
       this.#active?.profile.lights[name].some((i) => this.#pressed[i]) ?? false));
   }
 
-  /** @returns {boolean} whether the vehicle is to be put back on its lane */
-  get putBack() {
+  /** @returns whether the vehicle is to be put back on its lane */
+  get putBack(): boolean {
     return this.#active?.profile.put_back.some((i) => this.#pressed[i]) ?? false;
   }
 
-  /** @returns {boolean} whether the lever of the active device stands in reverse */
-  get gateHeld() {
+  /** @returns whether the lever of the active device stands in reverse */
+  get gateHeld(): boolean {
     return this.#active?.profile.reverse.held.some((i) => this.#pressed[i]) ?? false;
   }
 
   /**
    * Choose the device that drives.
    *
-   * @param {number|null} index of the device; null leaves only the keyboard
+   * @param index of the device; null leaves only the keyboard
    */
-  choose(index) {
+  choose(index: number | null) {
     const device = index === null ? null : this.#devices.get(index) ?? null;
     for (const other of this.#devices.values()) {
       // From here on only a new movement activates another device.
@@ -135,10 +134,9 @@ export class Gamepads {
   /**
    * Save a mapping for a device, or delete it and use the default again.
    *
-   * @param {number} index of the device
-   * @param {Profile|null} profile
+   * @param index of the device
    */
-  setProfile(index, profile) {
+  setProfile(index: number, profile: Profile | null) {
     const device = this.#devices.get(index);
     const pad = connectedPads().find((candidate) => candidate.index === index);
     if (device && pad) {
@@ -157,8 +155,7 @@ export class Gamepads {
     this.#report.listed();
   }
 
-  /** @param {Device|null} device */
-  #activate(device) {
+  #activate(device: Device | null) {
     this.#active = device;
     this.#pressed = device ? device.sample.buttons.map((value) => value > 0.5) : [];
     this.#report.listed();
@@ -184,8 +181,7 @@ export class Gamepads {
     }
   }
 
-  /** @param {Gamepad[]} pads */
-  #match(pads) {
+  #match(pads: Gamepad[]) {
     let listed = false;
     for (const pad of pads) {
       if (this.#devices.get(pad.index)?.id !== pad.id) {
@@ -215,8 +211,7 @@ export class Gamepads {
     }
   }
 
-  /** @param {Device} device */
-  #readGear({ sample, profile }) {
+  #readGear({ sample, profile }: Device) {
     sample.buttons.forEach((value, index) => {
       const pressed = value > 0.5;
       if (pressed !== this.#pressed[index]) {
@@ -226,8 +221,7 @@ export class Gamepads {
     });
   }
 
-  /** @param {Device} device */
-  #reportChange({ axes }) {
+  #reportChange({ axes }: Device) {
     const text = [...axes, ...this.lights, this.putBack].join();
     if (text !== this.#last) {
       this.#last = text;
@@ -236,12 +230,8 @@ export class Gamepads {
   }
 }
 
-/**
- * List the gamepads that the browser shows now.
- *
- * @returns {Gamepad[]}
- */
-export function connectedPads() {
+/** List the gamepads that the browser shows now. */
+export function connectedPads(): Gamepad[] {
   return [...navigator.getGamepads?.() ?? []].filter((pad) => pad !== null)
     .filter((pad) => pad.connected);
 }

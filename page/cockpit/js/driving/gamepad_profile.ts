@@ -2,39 +2,49 @@
 // SPDX-License-Identifier: Apache-2.0
 import { LIGHT_BUTTONS } from '../lights.js';
 
+// The mapping of a gamepad's or wheel's axes and buttons to functions, with their ranges.
 /**
- * The mapping of a gamepad's or wheel's axes and buttons to functions, with their ranges.
- *
- * @typedef {{kind: 'axis'|'button', index: number, min: number, max: number, invert: boolean,
- *   deadzone: number, centre?: number}} Control  `centre` only for the steering; the raw value
- *   rises from `min` to `max`, to the right or with the pedal unless `invert`.
- * @typedef {{on: number[], off: number[], toggle: number[], held: number[]}} GearButtons
- * @typedef {Record<typeof LIGHT_BUTTONS[number], number[]>} LightButtons
- * @typedef {{steering: Control, throttle: Control, brake: Control, reverse: GearButtons,
- *   lights: LightButtons, put_back: number[]}} Profile
- * @typedef {{axes: number[], buttons: number[]}} Sample  raw values at one time.
+ * `centre` only for the steering; the raw value rises from `min` to `max`, to the right or with
+ *   the pedal unless `invert`.
  */
+export interface Control {
+  kind: 'axis' | 'button';
+  index: number;
+  min: number;
+  max: number;
+  invert: boolean;
+  deadzone: number;
+  centre?: number;
+}
+
+export interface GearButtons { on: number[]; off: number[]; toggle: number[]; held: number[] }
+export type LightButtons = Record<typeof LIGHT_BUTTONS[number], number[]>;
+
+export interface Profile {
+  steering: Control;
+  throttle: Control;
+  brake: Control;
+  reverse: GearButtons;
+  lights: LightButtons;
+  put_back: number[];
+}
+
+export interface Sample { axes: number[]; buttons: number[] } // raw values at one time.
 
 const PREFIX = 'crgame.gamepad.';
-const NAMES = ['steering', 'throttle', 'brake'];
+const NAMES = ['steering', 'throttle', 'brake'] as const;
 
-/**
- * Read a gamepad's raw values.
- *
- * @param {Gamepad} pad
- * @returns {Sample}
- */
-export function sampleOf(pad) {
+/** Read a gamepad's raw values. */
+export function sampleOf(pad: Gamepad): Sample {
   return { axes: pad.axes.map(Number), buttons: pad.buttons.map((button) => button.value) };
 }
 
 /**
  * Return the default mapping of a device that is not calibrated.
  *
- * @param {Gamepad} pad in its first state: Logitech pedals rest at +1.
- * @returns {Profile}
+ * @param pad in its first state: Logitech pedals rest at +1.
  */
-export function defaultProfile(pad) {
+export function defaultProfile(pad: Gamepad): Profile {
   if (pad.mapping === 'standard') {
     return {
       steering: steeringOf(0, 0.08), throttle: triggerOf(7), brake: triggerOf(6),
@@ -57,53 +67,33 @@ export function defaultProfile(pad) {
   };
 }
 
-/**
- * @param {number} index
- * @param {number} deadzone
- * @returns {Control}
- */
-function steeringOf(index, deadzone) {
+function steeringOf(index: number, deadzone: number): Control {
   return { kind: 'axis', index, min: -1, centre: 0, max: 1, invert: false, deadzone };
 }
 
-/**
- * @param {number} index
- * @returns {Control}
- */
-function triggerOf(index) {
+function triggerOf(index: number): Control {
   return { kind: 'button', index, min: 0, max: 1, invert: false, deadzone: 0.02 };
 }
 
-/**
- * @param {number} index
- * @returns {Control}
- */
-function pedalOf(index) {
+function pedalOf(index: number): Control {
   return { kind: 'axis', index, min: -1, max: 1, invert: true, deadzone: 0.02 };
 }
 
-/**
- * @param {Gamepad} pad
- * @returns {LightButtons}
- */
-function lightsOfWheel(pad) {
+function lightsOfWheel(pad: Gamepad): LightButtons {
   // LSB and RSB of the wheels for the Xbox, L2 and R2 of the others.
   const [left, right] = isLogitechForXbox(pad) ? [9, 8] : [7, 6];
   return { left_indicator: [left], right_indicator: [right], hazard: [3], horn: [0] };
 }
 
-/** @param {Gamepad} pad */
-function isLogitechForXbox(pad) {
+function isLogitechForXbox(pad: Gamepad) {
   return /046d.*(c262|c26e)/i.test(pad.id);
 }
 
-/** @param {Gamepad} pad */
-function isLogitechWithGate(pad) {
+function isLogitechWithGate(pad: Gamepad) {
   return /046d.*(c24f|c266)/i.test(pad.id);
 }
 
-/** @param {Gamepad} pad */
-function pedalAxes(pad) {
+function pedalAxes(pad: Gamepad) {
   // G920 and the Xbox version of the G923 have the clutch on the last axis, the others on 1.
   if (isLogitechForXbox(pad)) {
     return [1, 2];
@@ -118,13 +108,8 @@ function pedalAxes(pad) {
   return pad.axes.length >= 4 ? [2, 3] : [1, 2];
 }
 
-/**
- * Load the calibrated mapping of a device, or its default.
- *
- * @param {Gamepad} pad
- * @returns {{profile: Profile, calibrated: boolean}}
- */
-export function loadProfile(pad) {
+/** Load the calibrated mapping of a device, or its default. */
+export function loadProfile(pad: Gamepad): { profile: Profile; calibrated: boolean } {
   const text = localStorage.getItem(PREFIX + pad.id);
   if (text !== null) {
     try {
@@ -146,10 +131,10 @@ export function loadProfile(pad) {
 /**
  * Save a calibrated mapping in this browser.
  *
- * @param {string} id of the gamepad.
- * @param {Profile|null} profile null forgets it.
+ * @param id of the gamepad.
+ * @param profile null forgets it.
  */
-export function saveProfile(id, profile) {
+export function saveProfile(id: string, profile: Profile | null) {
   if (profile === null) {
     localStorage.removeItem(PREFIX + id);
   } else {
@@ -160,9 +145,9 @@ export function saveProfile(id, profile) {
 /**
  * Save the mappings of another page of this machine; invalid ones are left out.
  *
- * @param {Record<string, unknown>} profiles JSON of each, by the gamepad's id
+ * @param profiles JSON of each, by the gamepad's id
  */
-export function keepProfiles(profiles) {
+export function keepProfiles(profiles: Record<string, unknown>) {
   for (const [id, text] of Object.entries(profiles)) {
     try {
       const profile = JSON.parse(String(text));
@@ -175,34 +160,30 @@ export function keepProfiles(profiles) {
   }
 }
 
-/**
- * @param {any} profile from storage
- * @returns {profile is Profile}
- */
-function isProfile(profile) {
-  /** @type {(control: any, names: string[]) => boolean} */
-  const numbers = (control, names) => names.every((name) => Number.isFinite(control[name]));
+/** @param profile from storage */
+function isProfile(profile: unknown): profile is Profile {
+  const found = profile as Partial<Profile> | null;
+  const numbers = (control: Control, names: (keyof Control)[]) => (
+    names.every((name) => Number.isFinite(control[name])));
   return NAMES.every((name) => {
-    const control = profile?.[name];
-    return ['axis', 'button'].includes(control?.kind)
+    const control = found?.[name];
+    return (control?.kind === 'axis' || control?.kind === 'button')
       && numbers(control, ['index', 'min', 'max', 'deadzone'])
       && (name !== 'steering' || numbers(control, ['centre']));
-  }) && ['on', 'off', 'toggle', 'held'].every((name) => Array.isArray(profile.reverse?.[name]));
+  }) && (['on', 'off', 'toggle', 'held'] as const).every(
+    (name) => Array.isArray(found?.reverse?.[name]));
 }
 
-/** @param {any} lights */
-function isLights(lights) {
+function isLights(lights: Partial<LightButtons> | undefined) {
   return LIGHT_BUTTONS.every((name) => Array.isArray(lights?.[name]));
 }
 
 /**
  * Read one raw value of a sample.
  *
- * @param {Sample} sample
- * @param {Pick<Control, 'kind'|'index'>} control
- * @returns {number} NaN if the device has no such control.
+ * @returns NaN if the device has no such control.
  */
-export function rawValue(sample, control) {
+export function rawValue(sample: Sample, control: Pick<Control, 'kind' | 'index'>): number {
   const values = control.kind === 'axis' ? sample.axes : sample.buttons;
   return values[control.index] ?? NaN;
 }
@@ -210,11 +191,9 @@ export function rawValue(sample, control) {
 /**
  * Return a pedal's share of its travel.
  *
- * @param {Sample} sample
- * @param {Control} control
- * @returns {number} 0 (released) to 1.
+ * @returns 0 (released) to 1.
  */
-export function pedalValue(sample, control) {
+export function pedalValue(sample: Sample, control: Control): number {
   const share = (rawValue(sample, control) - control.min) / (control.max - control.min);
   return beyond(control.invert ? 1 - share : share, control.deadzone);
 }
@@ -222,11 +201,9 @@ export function pedalValue(sample, control) {
 /**
  * Return the steering of a sample.
  *
- * @param {Sample} sample
- * @param {Control} control
- * @returns {number} -1 to 1, positive to the left.
+ * @returns -1 to 1, positive to the left.
  */
-export function steeringValue(sample, control) {
+export function steeringValue(sample: Sample, control: Control): number {
   const centre = control.centre ?? NaN;
   const offset = rawValue(sample, control) - centre;
   const side = offset > 0 ? control.max - centre : centre - control.min;
@@ -234,11 +211,7 @@ export function steeringValue(sample, control) {
   return size === 0 ? 0 : size * Math.sign(offset) * (control.invert ? 1 : -1);
 }
 
-/**
- * @param {number} share
- * @param {number} deadzone
- */
-function beyond(share, deadzone) {
+function beyond(share: number, deadzone: number) {
   // Stretched beyond the dead zone, so that there is no jump at its edge; NaN counts as rest.
   const size = (share - deadzone) / (1 - deadzone);
   return Number.isFinite(size) ? Math.min(1, Math.max(0, size)) : 0;
@@ -247,13 +220,13 @@ function beyond(share, deadzone) {
 /**
  * Return the gear after a button changed.
  *
- * @param {GearButtons} buttons
- * @param {boolean} reverse the gear before.
- * @param {number} index of the button.
- * @param {boolean} pressed whether it is pressed now.
- * @returns {boolean} whether reverse is selected.
+ * @param reverse the gear before.
+ * @param index of the button.
+ * @param pressed whether it is pressed now.
+ * @returns whether reverse is selected.
  */
-export function gearAfter(buttons, reverse, index, pressed) {
+export function gearAfter(buttons: GearButtons, reverse: boolean, index: number,
+  pressed: boolean): boolean {
   if (buttons.held.includes(index)) {
     return pressed;
   }

@@ -4,20 +4,20 @@
 
 import { element, setAttribute, setText } from '../dom.js';
 
-/** @param {number} share */
-const scaled = (share) => (Number.isFinite(share) ? share : 0).toFixed(3);
+const scaled = (share: number) => (Number.isFinite(share) ? share : 0).toFixed(3);
 
 /** An upright bar of one pedal. */
 export class PedalBar {
   #fill;
   #key;
   #value;
+  node;
 
   /**
-   * @param {string} kind 'throttle' or 'brake'
-   * @param {string} label under the bar
+   * @param kind 'throttle' or 'brake'
+   * @param label under the bar
    */
-  constructor(kind, label) {
+  constructor(kind: string, label: string) {
     this.#fill = element('div', { class: 'bar-fill' });
     this.#key = element('div', { class: 'bar-key' });
     this.#value = element('span', { class: 'bar-value', text: '–' });
@@ -29,10 +29,10 @@ export class PedalBar {
   /**
    * Show the bar and the outline of its key.
    *
-   * @param {number} command 0 to 1, NaN if no command is in force
-   * @param {boolean} key whether its key is held
+   * @param command 0 to 1, NaN if no command is in force
+   * @param key whether its key is held
    */
-  show(command, key) {
+  show(command: number, key: boolean) {
     const transform = `scaleY(${scaled(command)})`;
     if (this.#fill.style.transform !== transform) {
       this.#fill.style.transform = transform;
@@ -40,8 +40,8 @@ export class PedalBar {
     setAttribute(this.#key, 'data-on', key);
   }
 
-  /** @param {number} command written beside the bar in per cent */
-  write(command) {
+  /** @param command written beside the bar in per cent */
+  write(command: number) {
     setText(this.#value, Number.isFinite(command) ? `${Math.round(100 * command)} %` : '–');
   }
 }
@@ -51,6 +51,7 @@ export class SteeringBar {
   #fill = element('div', { class: 'bar-fill' });
   #left = element('div', { class: 'bar-key bar-left' });
   #right = element('div', { class: 'bar-key bar-right' });
+  node;
 
   constructor() {
     this.node = element('div', { class: 'bar steering-bar' },
@@ -60,11 +61,11 @@ export class SteeringBar {
   /**
    * Show the bar and the outlines of its keys.
    *
-   * @param {number} command -1 (right) to 1 (left), NaN if no command is in force
-   * @param {boolean} left whether a left key is held
-   * @param {boolean} right whether a right key is held
+   * @param command -1 (right) to 1 (left), NaN if no command is in force
+   * @param left whether a left key is held
+   * @param right whether a right key is held
    */
-  show(command, left, right) {
+  show(command: number, left: boolean, right: boolean) {
     // The fill grows from the middle to the right; a left command mirrors it.
     const transform = `scaleX(${scaled(-command)})`;
     if (this.#fill.style.transform !== transform) {

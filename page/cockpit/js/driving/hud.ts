@@ -10,9 +10,9 @@ import { LightSigns } from './light_signs.js';
 import { SpeedLimits } from './speed_limit.js';
 import { SteeringWheel } from './steering_wheel.js';
 
-/** @import { Scene, SceneVehicle } from '../messages.js' */
-/** @import { Store } from '../store.js' */
-/** @import { Keyboard } from './keyboard.js' */
+import type { Scene, SceneVehicle } from '../messages.js';
+import type { Store } from '../store.js';
+import type { Keyboard } from './keyboard.js';
 
 // Numbers that change faster than this cannot be read [ms].
 const NUMBERS_EVERY_MS = 100;
@@ -24,23 +24,22 @@ const DEGREES = 180 / Math.PI;
 const LIMIT_TOLERANCE = 0.3;
 
 /** Texts that explain why the controls are released, by reason. */
-const AWAY_TEXTS = Object.freeze(/** @type {Record<string, string>} */ ({
+const AWAY_TEXTS = Object.freeze({
   hidden: 'Hands off: this page is hidden.',
   focus: 'Hands off: click into this page to drive on.',
   dialog: 'Hands off while a dialog is open.',
   unplugged: 'The input device is unplugged: press a driving key, or plug it in and move it.',
-}));
+} as Record<string, string>);
 
-/**
- * @typedef {object} Subject
- * @property {string|null} id
- * @property {boolean} driven
- * @property {string|null} away
- * @property {string} lost
- * @property {boolean} reverse
- * @property {Keyboard} keyboard
- * @property {string} driver
- */
+export interface Subject {
+  id: string | null;
+  driven: boolean;
+  away: string | null;
+  lost: string;
+  reverse: boolean;
+  keyboard: Keyboard;
+  driver: string;
+}
 
 /** The overlay in `#hud`. */
 export class Hud {
@@ -51,19 +50,14 @@ export class Hud {
   #limits = new SpeedLimits(null);
   #numbersAt_ms = -Infinity;
   #limitAt_ms = -Infinity;
-  /** @type {string|null} */
-  #vehicleId = null;
-  /** @type {SceneVehicle|null} */
-  #vehicle = null;
+  #vehicleId: string | null = null;
+  #vehicle: SceneVehicle | null = null;
 
   /**
-   * @param {HTMLElement} root
-   * @param {Store} store
-   * @param {() => Subject} subject the vehicle to show, its inputs, and any fault of the
-   *   connection
-   * @param {Keyboard} keyboard its keys are drawn and can be pressed by touch
+   * @param subject the vehicle to show, its inputs, and any fault of the connection
+   * @param keyboard its keys are drawn and can be pressed by touch
    */
-  constructor(root, store, subject, keyboard) {
+  constructor(root: HTMLElement, store: Store, subject: () => Subject, keyboard: Keyboard) {
     this.#root = root;
     this.#store = store;
     this.#subject = subject;
@@ -73,23 +67,20 @@ export class Hud {
     store.on('scene', (scene) => this.#setScene(scene));
     store.on('events', ({ fired }) => this.#limits.applyEvents(fired));
     this.#setScene(store.scene);
-    /** @param {number} now_ms */
-    const frame = (now_ms) => {
+    const frame = (now_ms: number) => {
       this.#draw(now_ms);
       requestAnimationFrame(frame);
     };
     requestAnimationFrame(frame);
   }
 
-  /** @param {Scene|null} scene */
-  #setScene(scene) {
+  #setScene(scene: Scene | null) {
     this.#limits = new SpeedLimits(scene);
     this.#limits.applyEvents(this.#store.fired);
     this.#vehicleId = null;
   }
 
-  /** @param {number} now_ms */
-  #draw(now_ms) {
+  #draw(now_ms: number) {
     const subject = this.#subject();
     const index = subject.id === null ? -1 : this.#store.vehicleIndex(subject.id);
     const row = index < 0 ? null : this.#row(index, now_ms);
@@ -114,24 +105,15 @@ export class Hud {
     }
   }
 
-  /**
-   * @param {number} index
-   * @param {number} now_ms
-   */
-  #row(index, now_ms) {
+  #row(index: number, now_ms: number) {
     const values = this.#store.displayed(now_ms)?.vehicles;
     const from = index * VEHICLE_WIDTH;
     return values && values.length >= from + VEHICLE_WIDTH && Number.isFinite(values[from])
       ? values.subarray(from, from + VEHICLE_WIDTH) : null;
   }
 
-  /**
-   * Update the moving parts, in every animation frame.
-   *
-   * @param {Float64Array} row
-   * @param {Subject} subject
-   */
-  #show(row, { driven, keyboard, reverse }) {
+  /** Update the moving parts, in every animation frame. */
+  #show(row: Float64Array, { driven, keyboard, reverse }: Subject) {
     const p = this.#parts;
     const [throttleKey, brakeKey, left, right] = driven ? keyboard.keys : [0, 0, 0, 0];
     const command = row[VEHICLE.steering];
@@ -148,13 +130,8 @@ export class Hud {
     }
   }
 
-  /**
-   * Update the numbers, at a lower rate.
-   *
-   * @param {Float64Array} row
-   * @param {Subject} subject
-   */
-  #write(row, subject) {
+  /** Update the numbers, at a lower rate. */
+  #write(row: Float64Array, subject: Subject) {
     const p = this.#parts;
     const speed = row[VEHICLE.speed];
     setText(p.kmh, String(Math.round(Math.abs(speed) * KMH)));
@@ -176,8 +153,7 @@ export class Hud {
     setAttribute(p.banner, 'data-on', text !== '');
   }
 
-  /** @param {Float64Array} row */
-  #writeLimit(row) {
+  #writeLimit(row: Float64Array) {
     const limit = this.#limits.at(row[VEHICLE.x], row[VEHICLE.y], row[VEHICLE.yaw]);
     const { limit: sign } = this.#parts;
     setAttribute(sign, 'data-on', limit !== null);
@@ -190,26 +166,15 @@ export class Hud {
   }
 }
 
-/**
- * Return the current gear and the requested one, which is engaged only at standstill.
- *
- * @param {number} speed
- * @param {number} reverse
- * @returns {[gear: string, asked: string]}
- */
-function gears(speed, reverse) {
+/** Return the current gear and the requested one, which is engaged only at standstill. */
+function gears(speed: number, reverse: number): [gear: string, asked: string] {
   const asked = Number.isFinite(reverse) ? (reverse > 0.5 ? 'R' : 'D') : null;
   const gear = Math.abs(speed) < STANDSTILL ? asked ?? 'D' : speed < 0 ? 'R' : 'D';
   return [gear, asked ?? gear];
 }
 
-/**
- * Format a number with its sign, without a sign if it rounds to zero.
- *
- * @param {number} value
- * @param {number} digits
- */
-function signed(value, digits) {
+/** Format a number with its sign, without a sign if it rounds to zero. */
+function signed(value: number, digits: number) {
   if (!Number.isFinite(value)) {
     return '–';
   }
@@ -220,10 +185,9 @@ function signed(value, digits) {
   return `${value < 0 ? '−' : '+'}${text}`;
 }
 
-/** @param {Keyboard} keyboard */
-function buildParts(keyboard) {
-  /** @type {(name: string, title?: string) => HTMLElement} */
-  const span = (name, title) => element('span', { class: `hud-${name}`, title });
+function buildParts(keyboard: Keyboard) {
+  const span = (name: string,
+    title?: string): HTMLElement => element('span', { class: `hud-${name}`, title });
   const parts = {
     kmh: span('kmh', 'Speed'), ms: span('ms', 'Signed speed'), gear: span('gear', 'Gear'),
     acceleration: span('acceleration', 'Acceleration'), who: span('who'), device: span('device'),
@@ -247,25 +211,21 @@ function buildParts(keyboard) {
   return { ...parts, board };
 }
 
-/** @param {Record<'kmh'|'ms'|'acceleration', HTMLElement> & {lights: LightSigns}} parts */
-function speedBlock({ kmh, ms, acceleration, lights }) {
+function speedBlock({ kmh, ms, acceleration, lights }: Record<'kmh' | 'ms' | 'acceleration',
+  HTMLElement> & { lights: LightSigns }) {
   return element('div', { class: 'hud-speed' }, lights.node,
     element('div', { class: 'hud-main' }, kmh,
       element('span', { class: 'hud-unit', text: 'km/h' })),
     element('div', { class: 'hud-small' }, ms, acceleration));
 }
 
-/** @param {{angle: HTMLElement, command: HTMLElement, steering: SteeringBar}} parts */
-function turnBlock({ angle, command, steering }) {
+function turnBlock({ angle, command, steering }: { angle: HTMLElement; command: HTMLElement;
+  steering: SteeringBar }) {
   return element('div', { class: 'hud-turn' }, element('div', { class: 'hud-angles' },
     label('Wheels', angle), label('Steering', command)), steering.node);
 }
 
-/**
- * @param {string} text
- * @param {HTMLElement} value
- */
-function label(text, value) {
+function label(text: string, value: HTMLElement) {
   return element('div', { class: 'hud-labelled' },
     element('span', { class: 'bar-label', text }), value);
 }

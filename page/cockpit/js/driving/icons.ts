@@ -4,10 +4,9 @@
 
 import { svg } from '../dom.js';
 
-/** @import { RunAction } from '../messages.js' */
+import type { RunAction } from '../messages.js';
 
-/** @type {Record<RunAction, string>} */
-const PATHS = {
+const PATHS: Record<RunAction, string> = {
   start: 'M6 4 L20 12 L6 20 Z',
   pause: 'M6 4 H10 V20 H6 Z M14 4 H18 V20 H14 Z',
   step: 'M4 4 L15 12 L4 20 Z M17 4 H20 V20 H17 Z',
@@ -18,10 +17,9 @@ const PATHS = {
 /**
  * Draw an icon in the colour of the text around it.
  *
- * @param {RunAction} name one of start, pause, step, reset and stop
- * @returns {SVGElement}
+ * @param name one of start, pause, step, reset and stop
  */
-export function icon(name) {
+export function icon(name: RunAction): SVGElement {
   return svg('svg', { class: 'icon', viewBox: '0 0 24 24', 'aria-hidden': 'true' },
     svg('path', { d: PATHS[name] }));
 }

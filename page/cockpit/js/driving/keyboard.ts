@@ -6,39 +6,34 @@ import { HELD_MS } from '../after/restart_key.js';
 import { LIGHT_BUTTONS } from '../lights.js';
 import { isTyping } from './focus.js';
 
-/**
- * @typedef {'throttle'|'brake'|'left'|'right'|'reverse'|'put_back'
- *   |typeof LIGHT_BUTTONS[number]} KeyAction
- */
+export type KeyAction = 'throttle' | 'brake' | 'left' | 'right' | 'reverse' | 'put_back'
+  | typeof LIGHT_BUTTONS[number];
 
 /** The function of each key by its place on the keyboard, so that every layout drives alike. */
-export const ACTIONS = Object.freeze(/** @type {Record<string, KeyAction|undefined>} */ ({
+export const ACTIONS = Object.freeze({
   KeyW: 'throttle', ArrowUp: 'throttle',
   KeyS: 'brake', ArrowDown: 'brake', Space: 'brake',
   KeyA: 'left', ArrowLeft: 'left',
   KeyD: 'right', ArrowRight: 'right',
   KeyR: 'reverse', Backspace: 'put_back',
   Comma: 'left_indicator', Period: 'right_indicator', KeyJ: 'hazard', KeyG: 'horn',
-}));
+} as Record<string, KeyAction | undefined>);
 
-/** @type {KeyAction[]} */
-const ORDER = ['throttle', 'brake', 'left', 'right'];
+const ORDER: KeyAction[] = ['throttle', 'brake', 'left', 'right'];
 
 /** A listener to the driving keys while `enabled` returns true. */
 export class Keyboard {
   #enabled;
   #report;
-  /** @type {Set<string>} */
-  #held = new Set();
+  #held = new Set<string>();
   // Time at which R was pressed [ms]. A tap is reported at release, because holding R restarts.
   #reverseSince_ms = NaN;
 
   /**
-   * @param {() => boolean} enabled whether keys drive now
-   * @param {{changed: () => void, reversed: () => void}} report `changed` at each change of the
-   *   held keys, `reversed` at each tap on R
+   * @param enabled whether keys drive now
+   * @param report `changed` at each change of the held keys, `reversed` at each tap on R
    */
-  constructor(enabled, report) {
+  constructor(enabled: () => boolean, report: { changed: () => void; reversed: () => void }) {
     this.#enabled = enabled;
     this.#report = report;
     // The capture phase precedes any widget, so that a focused button does not take the space bar.
@@ -51,40 +46,40 @@ export class Keyboard {
     });
   }
 
-  /** @returns {number[]} throttle, brake, left, right: 1 while a key of it is held */
-  get keys() {
+  /** @returns throttle, brake, left, right: 1 while a key of it is held */
+  get keys(): number[] {
     return this.#active(ORDER);
   }
 
-  /** @returns {number[]} left and right indicator, hazard, horn: 1 while a key of it is held */
-  get lights() {
+  /** @returns left and right indicator, hazard, horn: 1 while a key of it is held */
+  get lights(): number[] {
     return this.#active(LIGHT_BUTTONS);
   }
 
-  /** @returns {boolean} whether the vehicle is to be put back on its lane */
-  get putBack() {
+  /** @returns whether the vehicle is to be put back on its lane */
+  get putBack(): boolean {
     return this.#active(['put_back'])[0] === 1;
   }
 
-  /** @returns {boolean} whether any key that steers or moves a pedal is held */
-  get anyHeld() {
+  /** @returns whether any key that steers or moves a pedal is held */
+  get anyHeld(): boolean {
     return this.keys.includes(1);
   }
 
   /**
-   * @param {string} code place of a key, such as 'KeyW'
-   * @returns {boolean} whether it is held
+   * @param code place of a key, such as 'KeyW'
+   * @returns whether it is held
    */
-  isHeld(code) {
+  isHeld(code: string): boolean {
     return this.#held.has(code);
   }
 
   /**
    * Press a key by touch.
    *
-   * @param {string} code place of a key
+   * @param code place of a key
    */
-  press(code) {
+  press(code: string) {
     if (this.#enabled()) {
       this.#press(code, performance.now());
     }
@@ -93,9 +88,9 @@ export class Keyboard {
   /**
    * Release a key that `press` has pressed.
    *
-   * @param {string} code place of a key
+   * @param code place of a key
    */
-  lift(code) {
+  lift(code: string) {
     this.#leave(code, performance.now());
   }
 
@@ -108,14 +103,12 @@ export class Keyboard {
     }
   }
 
-  /** @param {readonly KeyAction[]} actions */
-  #active(actions) {
+  #active(actions: readonly KeyAction[]) {
     const active = new Set([...this.#held].map((code) => ACTIONS[code]));
     return actions.map((action) => Number(active.has(action)));
   }
 
-  /** @param {KeyboardEvent} event */
-  #down(event) {
+  #down(event: KeyboardEvent) {
     // While the command key is held, macOS reports no key releases.
     if (event.key === 'Meta') {
       this.release();
@@ -134,11 +127,7 @@ export class Keyboard {
     this.#press(event.code, event.timeStamp);
   }
 
-  /**
-   * @param {string} code
-   * @param {number} now_ms
-   */
-  #press(code, now_ms) {
+  #press(code: string, now_ms: number) {
     if (ACTIONS[code] === 'reverse') {
       this.#reverseSince_ms = now_ms;
     } else if (!this.#held.has(code)) {
@@ -147,12 +136,8 @@ export class Keyboard {
     }
   }
 
-  /**
-   * @param {string} code
-   * @param {number} now_ms
-   * @returns {boolean} whether it was held
-   */
-  #leave(code, now_ms) {
+  /** @returns whether it was held */
+  #leave(code: string, now_ms: number): boolean {
     if (ACTIONS[code] === 'reverse') {
       if (now_ms - this.#reverseSince_ms < HELD_MS) {
         this.#report.reversed();
@@ -166,8 +151,7 @@ export class Keyboard {
     return held;
   }
 
-  /** @param {KeyboardEvent} event */
-  #up(event) {
+  #up(event: KeyboardEvent) {
     if (this.#leave(event.code, event.timeStamp)) {
       // Firefox activates a focused button when the space bar is released.
       event.preventDefault();

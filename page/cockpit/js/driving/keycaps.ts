@@ -4,11 +4,10 @@
 
 import { element, setAttribute, setText } from '../dom.js';
 
-/** @import { Keyboard } from './keyboard.js' */
+import type { Keyboard } from './keyboard.js';
 
 // The place of a key, its label, the other key with the same function, and a sign beside it.
-/** @type {[code: string, text: string, twin: string|null, title: string, sign?: string][]} */
-const CAPS = [
+const CAPS: [code: string, text: string, twin: string | null, title: string, sign?: string][] = [
   ['KeyW', 'W', 'ArrowUp', 'Throttle'], ['KeyR', 'R', null, 'Reverse gear'],
   ['KeyA', 'A', 'ArrowLeft', 'Left'], ['KeyS', 'S', 'ArrowDown', 'Brake'],
   ['KeyD', 'D', 'ArrowRight', 'Right'], ['Space', 'Space', null, 'Brake'],
@@ -18,11 +17,11 @@ const CAPS = [
 
 /** The drawn keys; `node` goes into the page. */
 export class Keycaps {
-  /** @type {Map<string, HTMLElement>} */
-  #caps = new Map();
+  #caps = new Map<string, HTMLElement>();
+  node;
 
-  /** @param {Pick<Keyboard, 'press'|'lift'>} keyboard receives touch presses */
-  constructor(keyboard) {
+  /** @param keyboard receives touch presses */
+  constructor(keyboard: Pick<Keyboard, 'press' | 'lift'>) {
     for (const [code, text, , title, sign] of CAPS) {
       const lift = () => keyboard.lift(code);
       this.#caps.set(code, element('kbd', { class: `cap cap-${code}`, title,
@@ -30,7 +29,7 @@ export class Keycaps {
         pointerdown: (event) => {
           event.preventDefault();
           // A finger that slides off the key still holds it.
-          /** @type {HTMLElement} */ (event.currentTarget).setPointerCapture(event.pointerId);
+          (event.currentTarget as HTMLElement).setPointerCapture(event.pointerId);
           keyboard.press(code);
         },
         pointerup: lift, pointercancel: lift, lostpointercapture: lift,
@@ -48,10 +47,9 @@ export class Keycaps {
   /**
    * Light the held keys.
    *
-   * @param {Keyboard} keyboard
-   * @param {boolean} reverse whether the reverse gear is requested
+   * @param reverse whether the reverse gear is requested
    */
-  show(keyboard, reverse) {
+  show(keyboard: Keyboard, reverse: boolean) {
     for (const [code, , twin] of CAPS) {
       const on = code === 'KeyR' ? reverse
         : keyboard.isHeld(code) || (twin !== null && keyboard.isHeld(twin));
@@ -59,12 +57,9 @@ export class Keycaps {
     }
   }
 
-  /**
-   * @param {string} code of CAPS
-   * @returns {HTMLElement}
-   */
-  #cap(code) {
-    return /** @type {HTMLElement} */ (this.#caps.get(code));
+  /** @param code of CAPS */
+  #cap(code: string): HTMLElement {
+    return this.#caps.get(code) as HTMLElement;
   }
 
   /** Write the labels of the user's keyboard layout, if the browser knows it. */

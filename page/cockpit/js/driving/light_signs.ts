@@ -5,8 +5,7 @@
 import { element, setAttribute } from '../dom.js';
 import { LIGHT, shining } from '../lights.js';
 
-/** @type {[name: 'left'|'horn'|'right', sign: string, title: string][]} */
-const SIGNS = [
+const SIGNS: [name: 'left' | 'horn' | 'right', sign: string, title: string][] = [
   ['left', '◄', 'Left indicator'], ['horn', '♪', 'Horn'], ['right', '►', 'Right indicator'],
 ];
 
@@ -15,6 +14,7 @@ export class LightSigns {
   #signs = SIGNS.map(([name, text, title]) => ({
     name, title, node: element('span', { class: `sign sign-${name}`, role: 'img', title, text }),
   }));
+  node;
 
   constructor() {
     this.node = element('div', { class: 'hud-lights' }, ...this.#signs.map(({ node }) => node));
@@ -23,10 +23,10 @@ export class LightSigns {
   /**
    * Update the signs.
    *
-   * @param {number} lights as the vehicle's state has them
-   * @param {number} t simulation time [s]
+   * @param lights as the vehicle's state has them
+   * @param t simulation time [s]
    */
-  show(lights, t) {
+  show(lights: number, t: number) {
     const shines = shining(lights, t);
     for (const { name, title, node } of this.#signs) {
       // Screen readers are told once, not at each blink.

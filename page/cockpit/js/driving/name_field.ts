@@ -4,8 +4,8 @@
 
 import { element } from '../dom.js';
 
-/** @import { Connection } from '../connection.js' */
-/** @import { Store } from '../store.js' */
+import type { Connection } from '../connection.js';
+import type { Store } from '../store.js';
 
 const KEY = 'crgame.name';
 const LONGEST = 40;
@@ -16,12 +16,9 @@ export class NameField {
   #connection;
   #input = element('input', { type: 'text', id: 'my-name', maxlength: LONGEST,
     autocomplete: 'nickname', placeholder: 'Your name' });
+  node;
 
-  /**
-   * @param {Store} store
-   * @param {Connection} connection
-   */
-  constructor(store, connection) {
+  constructor(store: Store, connection: Connection) {
     this.#store = store;
     this.#connection = connection;
     this.node = element('form', { class: 'name-field' },

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** A notice for a driver whose request to be put back on the lane had no effect. */
 
-/** @import { FiredEvent } from '../messages.js' */
-/** @import { Store } from '../store.js' */
+import type { FiredEvent } from '../messages.js';
+import type { Store } from '../store.js';
 
 // Time after which the request has failed: a vehicle is put back within a step, but the event
 // takes longer to reach the page [ms].
@@ -17,18 +17,16 @@ export class PutBackNotice {
   #timer = 0;
   #asked = false;
 
-  /** @param {Store} store */
-  constructor(store) {
+  constructor(store: Store) {
     this.#store = store;
   }
 
   /**
    * Update with the driver's input; holding the control requests once.
    *
-   * @param {string|null} seat
-   * @param {boolean} asked whether the driver requests to be put back
+   * @param asked whether the driver requests to be put back
    */
-  update(seat, asked) {
+  update(seat: string | null, asked: boolean) {
     const begins = asked && !this.#asked;
     this.#asked = asked;
     if (begins && seat !== null && standsAtContact(this.#store.fired, seat)) {
@@ -37,8 +35,7 @@ export class PutBackNotice {
     }
   }
 
-  /** @param {string} seat */
-  #warn(seat) {
+  #warn(seat: string) {
     const { fired, status } = this.#store;
     if (status?.run === 'running' && standsAtContact(fired, seat)) {
       this.#store.receive({ type: 'notice', level: 'warn', text: IN_VAIN });
@@ -46,12 +43,8 @@ export class PutBackNotice {
   }
 }
 
-/**
- * @param {FiredEvent[]} fired
- * @param {string} seat
- * @returns {boolean} whether a contact has stopped the vehicle, and it was not put back since
- */
-export function standsAtContact(fired, seat) {
+/** @returns whether a contact has stopped the vehicle, and it was not put back since */
+export function standsAtContact(fired: FiredEvent[], seat: string): boolean {
   const last = fired.findLast(({ by, name }) => (by === 'contact'
     ? name.split(' ')[2] === seat : by === 'driver' && name.endsWith(` ${seat}`)));
   return last?.by === 'contact';

@@ -4,18 +4,18 @@
 
 import { element, setAttribute, setText } from '../dom.js';
 
-/** @import { Kind, Place } from './calibration_run.js' */
-/** @import { Sample } from './gamepad_profile.js' */
+import type { Kind, Place } from './calibration_run.js';
+import type { Sample } from './gamepad_profile.js';
 
-/** @typedef {{node: HTMLElement, fill: HTMLElement, value: HTMLElement|null}} Row */
+export interface Row { node: HTMLElement; fill: HTMLElement; value: HTMLElement | null }
 
 /** Bars for each axis (-1 to 1) and button (0 to 1). */
 export class RawBars {
-  /** @type {Record<Kind, Row[]>} */
-  #rows = { axis: [], button: [] };
+  #rows: Record<Kind, Row[]> = { axis: [], button: [] };
+  node;
 
-  /** @param {Sample} sample of the device, for its number of axes and buttons */
-  constructor(sample) {
+  /** @param sample of the device, for its number of axes and buttons */
+  constructor(sample: Sample) {
     const axes = sample.axes.map((_, i) => this.#row('axis', `Axis ${i}`));
     const buttons = sample.buttons.map((_, i) => this.#row('button', `${i}`));
     this.node = element('div', { class: 'raw-bars' },
@@ -27,20 +27,14 @@ export class RawBars {
   /**
    * Show a sample.
    *
-   * @param {Sample} sample
-   * @param {Place|null} found the moved control, which is marked
+   * @param found the moved control, which is marked
    */
-  show(sample, found) {
+  show(sample: Sample, found: Place | null) {
     this.#showAll('axis', sample.axes, found);
     this.#showAll('button', sample.buttons, found);
   }
 
-  /**
-   * @param {Kind} kind
-   * @param {number[]} values
-   * @param {Place|null} found
-   */
-  #showAll(kind, values, found) {
+  #showAll(kind: Kind, values: number[], found: Place | null) {
     this.#rows[kind].forEach((row, index) => {
       const value = values[index] ?? 0;
       row.fill.style.transform = kind === 'axis' ? `scaleX(${value.toFixed(3)})`
@@ -52,11 +46,7 @@ export class RawBars {
     });
   }
 
-  /**
-   * @param {Kind} kind
-   * @param {string} text
-   */
-  #row(kind, text) {
+  #row(kind: Kind, text: string) {
     const fill = element('div', { class: 'bar-fill' });
     const value = kind === 'axis' ? element('span', { class: 'bar-value' }) : null;
     const node = element('div', { class: `raw-${kind}` },

@@ -4,9 +4,9 @@
 
 import { oneLine } from '../panels/format.js';
 
-/** @import { Seat } from '../messages.js' */
+import type { Seat } from '../messages.js';
 
-const GAME_DRIVERS = new Map(/** @type {[kind: string, text: (rest: string) => string][]} */ ([
+const GAME_DRIVERS = new Map<string, (rest: string) => string>([
   ['auto', () => 'Driven by a device on the simulation machine, if one is there'],
   ['evdev', (name) => (name ? `Driven by the device ${name}` : 'Driven by a device')],
   ['idle', () => 'Not driven'],
@@ -14,18 +14,18 @@ const GAME_DRIVERS = new Map(/** @type {[kind: string, text: (rest: string) => s
   ['keys', (file) => `Driven by the script ${file}`],
   ['policy', (file) => `Driven by the policy ${file}`],
   ['replay', (bag) => `Replays the recording ${bag}`],
-]));
+]);
 
 /**
  * Return a text that says what drives a seat.
  *
- * @param {Pick<Seat, 'source'|'driver'|'holder'|'holder_name'|'kept'>} seat
- * @param {string|undefined} role 'human' or 'autonomous'
- * @param {string|undefined} planner name of the AV's planner
- * @param {string} me id of this client
- * @returns {string}
+ * @param role 'human' or 'autonomous'
+ * @param planner name of the AV's planner
+ * @param me id of this client
  */
-export function describeSeat(seat, role, planner, me) {
+export function describeSeat(
+  seat: Pick<Seat, 'source' | 'driver' | 'holder' | 'holder_name' | 'kept'>,
+  role: string | undefined, planner: string | undefined, me: string): string {
   if (seat.holder !== null) {
     return seat.holder === me && me !== '' ? 'You drive'
       : `Driven by ${oneLine(seat.holder_name || seat.holder)} in a cockpit`;

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The sender of the driver's inputs for the held seat: at each change and periodically. */
 
-/** @import { Connection } from '../connection.js' */
-/** @import { Hands } from '../messages.js' */
+import type { Connection } from '../connection.js';
+import type { Hands } from '../messages.js';
 
 // The server releases the controls after 200 ms of silence.
 const REPEAT_MS = 50;
@@ -12,27 +12,23 @@ const REPEAT_MS = 50;
 export class InputSender {
   #connection;
   #hands;
-  /** @type {string|null} */
-  #seat = null;
+  #seat: string | null = null;
   #last = '';
 
-  /**
-   * @param {Connection} connection
-   * @param {() => Hands} hands returns the current inputs
-   */
-  constructor(connection, hands) {
+  /** @param hands returns the current inputs */
+  constructor(connection: Connection, hands: () => Hands) {
     this.#connection = connection;
     this.#hands = hands;
     setInterval(() => this.#repeat(), REPEAT_MS);
   }
 
-  /** @returns {string|null} the seat that receives the inputs */
-  get seat() {
+  /** @returns the seat that receives the inputs */
+  get seat(): string | null {
     return this.#seat;
   }
 
-  /** @param {string|null} seat the seat that is held from now on, or null */
-  set seat(seat) {
+  /** @param seat the seat that is held from now on, or null */
+  set seat(seat: string | null) {
     if (seat !== this.#seat) {
       this.#seat = seat;
       this.#last = '';
@@ -65,11 +61,7 @@ export class InputSender {
     }
   }
 
-  /**
-   * @param {string} seat
-   * @param {Hands} input
-   */
-  #send(seat, input) {
+  #send(seat: string, input: Hands) {
     this.#connection.send({ type: 'input', seat, ...input });
   }
 }

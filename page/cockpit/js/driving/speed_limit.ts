@@ -4,21 +4,25 @@
 
 import { boxOf, contains, outlineOf } from '../outline.js';
 
-/** @import { Box, FiredEvent, Scene } from '../messages.js' */
+import type { Box, FiredEvent, Scene } from '../messages.js';
 
-/**
- * @typedef {{id: number, limit: number|null, usual: number|null, center: number[],
- *   one_way: boolean, ring: number[], box: Box}} Lane
- */
+export interface Lane {
+  id: number;
+  limit: number | null;
+  usual: number | null;
+  center: number[];
+  one_way: boolean;
+  ring: number[];
+  box: Box;
+}
 
 /** A lookup of the speed limit under a point. */
 export class SpeedLimits {
-  /** @type {Lane[]} */
-  #lanes = [];
+  #lanes: Lane[] = [];
   #scene;
 
-  /** @param {Scene|null} scene the scene document */
-  constructor(scene) {
+  /** @param scene the scene document */
+  constructor(scene: Scene | null) {
     this.#scene = scene;
     for (const lanelet of scene?.lanelets ?? []) {
       this.#lanes.push({
@@ -29,12 +33,8 @@ export class SpeedLimits {
     }
   }
 
-  /**
-   * Apply the limits of fired events, the latest last.
-   *
-   * @param {FiredEvent[]} fired
-   */
-  applyEvents(fired) {
+  /** Apply the limits of fired events, the latest last. */
+  applyEvents(fired: FiredEvent[]) {
     for (const lane of this.#lanes) {
       lane.limit = lane.usual;
     }
@@ -53,12 +53,12 @@ export class SpeedLimits {
    * Return the limit of the lane under a vehicle; at a crossing, of the lane that fits its
    * heading.
    *
-   * @param {number} x of the vehicle [m]
-   * @param {number} y of the vehicle [m]
-   * @param {number} yaw of the vehicle [rad]
-   * @returns {number|null} [m/s], null if none is known
+   * @param x of the vehicle [m]
+   * @param y of the vehicle [m]
+   * @param yaw of the vehicle [rad]
+   * @returns [m/s], null if none is known
    */
-  at(x, y, yaw) {
+  at(x: number, y: number, yaw: number): number | null {
     let best = null;
     let bestAlong = -Infinity;
     for (const lane of this.#lanes) {
@@ -75,12 +75,7 @@ export class SpeedLimits {
   }
 }
 
-/**
- * @param {number[]} center
- * @param {number} x
- * @param {number} y
- */
-function headingNear(center, x, y) {
+function headingNear(center: number[], x: number, y: number) {
   let nearest = 0;
   let least = Infinity;
   for (let i = 0; i + 3 < center.length; i += 2) {

@@ -10,6 +10,7 @@ const FULL_LOCK_DEG = 150;
 /** One drawing; `node` goes into the page. */
 export class SteeringWheel {
   #turning;
+  node;
 
   constructor() {
     this.#turning = svg('g', { class: 'wheel-turning' },
@@ -25,9 +26,9 @@ export class SteeringWheel {
   /**
    * Turn the wheel.
    *
-   * @param {number} steering -1 (right) to 1 (left)
+   * @param steering -1 (right) to 1 (left)
    */
-  turn(steering) {
+  turn(steering: number) {
     const angle = Number.isFinite(steering) ? -steering * FULL_LOCK_DEG : 0;
     setAttribute(this.#turning, 'transform', `rotate(${angle.toFixed(1)})`);
   }

@@ -6,12 +6,11 @@ import { element, part, setText } from '../dom.js';
 import { clockTime, oneLine } from './format.js';
 import { icon } from './icons.js';
 
-/** @import { Alarm, Scene } from '../messages.js' */
-/** @import { Store } from '../store.js' */
+import type { Alarm, Scene } from '../messages.js';
+import type { Store } from '../store.js';
 
 // kind: [word for the header, urgent]. Urgent ones frame the whole world, others mark its top.
-/** @type {Map<string, [word: string, urgent: boolean]>} */
-const KINDS = new Map([
+const KINDS = new Map<string, [word: string, urgent: boolean]>([
   ['collision', ['Collision', true]],
   ['off_road', ['Off road', true]],
   ['lost_device', ['Input lost', true]],
@@ -27,26 +26,28 @@ const WHILE_RUNNING = ['late', 'late_traffic'];
 const LINGERS_MS = 4000;
 const CONNECTS_WITHIN_MS = 3000;
 
-/**
- * @typedef {{chip: HTMLElement, says: HTMLElement, whom: HTMLElement}} Chip and its two texts
- * @typedef {Alarm & Chip & {timer: number, urgent: boolean, ended: boolean, known: boolean,
- *   mine: boolean}} Shown
- */
+/** And its two texts. */
+export interface Chip { chip: HTMLElement; says: HTMLElement; whom: HTMLElement }
+
+export interface Shown extends Alarm, Chip {
+  timer: number;
+  urgent: boolean;
+  ended: boolean;
+  known: boolean;
+  mine: boolean;
+}
 
 /**
  * Show the alarms.
  *
- * @param {HTMLElement} root #alarms in the header
- * @param {Store} store
- * @returns {{kinds: () => string[]}} kinds: those on the page now
+ * @param root #alarms in the header
+ * @returns kinds: those on the page now
  */
-export function createAlarms(root, store) {
+export function createAlarms(root: HTMLElement, store: Store): { kinds: () => string[] } {
   const frame = part(document.body, 'alarm-frame');
   const signs = part(document.body, 'alarm-signs');
-  /** @type {Map<string, Shown>} */
-  const alarms = new Map();
-  /** @param {string} id */
-  const remove = (id) => {
+  const alarms = new Map<string, Shown>();
+  const remove = (id: string) => {
     alarms.get(id)?.chip.remove();
     alarms.delete(id);
     paint(frame, signs, alarms);
@@ -109,11 +110,8 @@ export function createAlarms(root, store) {
 /**
  * Return whether an alarm concerns the vehicle that this page drives or, without one, follows.
  * An alarm that is not about a vehicle concerns every page.
- *
- * @param {Alarm} alarm
- * @param {Store} store
  */
-function concerns({ subject }, { scene, seats, me }) {
+function concerns({ subject }: Alarm, { scene, seats, me }: Store) {
   if (!scene?.vehicles.some(({ id }) => id === subject)) {
     return true;
   }
@@ -121,13 +119,8 @@ function concerns({ subject }, { scene, seats, me }) {
   return subject === (seat ?? window.crgame?.world?.followed ?? subject);
 }
 
-/**
- * Return the page's own alarms: that the server has become silent.
- *
- * @param {Store} store
- * @returns {Alarm[]}
- */
-function ownAlarms(store) {
+/** Return the page's own alarms: that the server has become silent. */
+function ownAlarms(store: Store): Alarm[] {
   // After the end of a run the program may have ended too.
   return store.connected || store.status?.run === 'ended' ? [] : [{
     id: 'page-connection', kind: 'connection', subject: '',
@@ -135,22 +128,14 @@ function ownAlarms(store) {
   }];
 }
 
-/**
- * @param {Alarm} alarm
- * @returns {Chip}
- */
-function makeChip(alarm) {
+function makeChip(alarm: Alarm): Chip {
   const says = element('span', { class: 'alarm-word' });
   const whom = element('span', { class: 'alarm-subject' });
   const chip = element('button', { type: 'button', class: 'alarm' }, icon(alarm.kind), says, whom);
   return { chip, says, whom };
 }
 
-/**
- * @param {Shown} entry
- * @param {Scene|null} scene
- */
-function describe(entry, scene) {
+function describe(entry: Shown, scene: Scene | null) {
   const [word, urgent] = KINDS.get(entry.kind) ?? [oneLine(entry.kind).replaceAll('_', ' '), true];
   entry.urgent = urgent;
   entry.chip.className = `alarm ${urgent ? 'urgent' : 'minor'}${entry.ended ? ' ended' : ''}`
@@ -165,12 +150,8 @@ function describe(entry, scene) {
   setText(entry.whom, isVehicle ? entry.subject : '');
 }
 
-/**
- * Hide words, those of minor and ended alarms first, until all alarms fit.
- *
- * @param {HTMLElement} root
- */
-function fitWords(root) {
+/** Hide words, those of minor and ended alarms first, until all alarms fit. */
+function fitWords(root: HTMLElement) {
   for (const words of ['all', 'urgent', 'none']) {
     root.dataset.words = words;
     // One pixel of tolerance for rounding.
@@ -180,12 +161,7 @@ function fitWords(root) {
   }
 }
 
-/**
- * @param {HTMLElement} frame
- * @param {HTMLElement} signs
- * @param {Map<string, Shown>} alarms
- */
-function paint(frame, signs, alarms) {
+function paint(frame: HTMLElement, signs: HTMLElement, alarms: Map<string, Shown>) {
   const all = [...alarms.values()].filter((alarm) => alarm.mine && !alarm.known);
   const active = all.filter((alarm) => !alarm.ended);
   const worst = ['urgent', 'minor'].find(

@@ -13,6 +13,7 @@ export class Busy {
   #timer = 0;
   #since = 0;
   #words = '';
+  root;
 
   constructor() {
     this.root = element('div', { class: 'busy', role: 'status', hidden: true },
@@ -22,9 +23,9 @@ export class Busy {
   /**
    * Start, or change the text; the seconds count from the first call.
    *
-   * @param {string} words what is being done
+   * @param words what is being done
    */
-  describe(words) {
+  describe(words: string) {
     this.#words = words;
     if (this.#timer === 0) {
       this.#since = performance.now();

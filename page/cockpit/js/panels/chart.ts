@@ -5,42 +5,36 @@
 import { element, setAttribute, setText } from '../dom.js';
 import { fixed } from './format.js';
 
-/** @import { Plotly } from './plotly.js' */
-/** @import { Quantity, Trace } from './quantities.js' */
+import type { Plotly } from './plotly.js';
+import type { Quantity, Trace } from './quantities.js';
 
 const CONFIG = { displayModeBar: false, doubleClick: 'reset', showTips: false };
 // A scrolling plot has no hover, which saves setting up handlers at each redrawing.
 const SCROLLING = { ...CONFIG, staticPlot: true };
 const HOVER_DIGITS = 3;
 
-/**
- * @typedef {object} ChartView
- * @property {number} from [s]
- * @property {number} to [s]
- * @property {number} shown time of the newest value [s]
- * @property {number|null} cursor [s]
- * @property {{grid: string, text: string, surface: string}} colours
- * @property {number} rem [px]
- * @property {boolean} frozen
- */
+export interface ChartView {
+  from: number; // [s]
+  to: number; // [s]
+  shown: number; // time of the newest value [s]
+  cursor: number | null; // [s]
+  colours: { grid: string; text: string; surface: string };
+  rem: number; // [px]
+  frozen: boolean;
+}
 
 /** A plot of one quantity over time. */
 export class Chart {
   #plotly;
   #plot = element('div', { class: 'chart-plot' });
   #values = element('span', { class: 'chart-values' });
-  /** @type {Map<string, HTMLElement>} */
-  #shown = new Map();
-  /** @type {DOMRectReadOnly|null} */
-  #box = null;
-  /** @type {Trace[]} */
-  #traces = [];
+  #shown = new Map<string, HTMLElement>();
+  #box: DOMRectReadOnly | null = null;
+  #traces: Trace[] = [];
+  quantity;
+  root;
 
-  /**
-   * @param {Plotly} library
-   * @param {Quantity} quantity
-   */
-  constructor(library, quantity) {
+  constructor(library: Plotly, quantity: Quantity) {
     this.#plotly = library;
     this.quantity = quantity;
     const lines = quantity.lines.flatMap((line, i) => (line.name ? [element('span', {
@@ -60,24 +54,15 @@ export class Chart {
     return this.#plot;
   }
 
-  /**
-   * Return the points drawn last, one row each: quantity, unit, line, time [s], value.
-   *
-   * @returns {(string|number)[][]}
-   */
-  get rows() {
+  /** Return the points drawn last, one row each: quantity, unit, line, time [s], value. */
+  get rows(): (string | number)[][] {
     const { title, unit } = this.quantity;
     return this.#traces.flatMap(({ name, x, y }) => Array.from(x, (t, i) => (
       [title, unit, name, t, y[i] ?? NaN])).filter((row) => Number.isFinite(row[4])));
   }
 
-  /**
-   * Draw.
-   *
-   * @param {Trace[]} traces
-   * @param {ChartView} view
-   */
-  update(traces, view) {
+  /** Draw. */
+  update(traces: Trace[], view: ChartView) {
     this.#traces = traces;
     this.#showValues(traces);
     const box = this.#box;
@@ -91,11 +76,7 @@ export class Chart {
     })), this.#layout(view, box), view.frozen ? CONFIG : SCROLLING);
   }
 
-  /**
-   * @param {ChartView} view
-   * @param {DOMRectReadOnly} box
-   */
-  #layout(view, box) {
+  #layout(view: ChartView, box: DOMRectReadOnly) {
     const { colours, rem } = view;
     const axis = {
       gridcolor: colours.grid, linecolor: colours.grid, zeroline: false, fixedrange: !view.frozen,
@@ -121,8 +102,7 @@ export class Chart {
     };
   }
 
-  /** @param {Trace[]} traces */
-  #showValues(traces) {
+  #showValues(traces: Trace[]) {
     if (this.#shown.size !== traces.length
         || traces.some((trace) => this.#shown.get(trace.name)?.dataset.color !== trace.color)) {
       this.#shown = new Map(traces.map((trace) => {

@@ -5,22 +5,17 @@
 import { themeColor } from '../world/palette.js';
 import { loadPlotly } from './plotly.js';
 
-/** @import { Chart } from './chart.js' */
+import type { Chart } from './chart.js';
 
 const HEAD_PX = 26;
 const WIDTH_PX = 720;
 const HEIGHT_PX = 190;
 const PIXELS = 2;
 
-/** @typedef {{text: string, width: number, height: number}} Picture SVG and its size [px] */
+export interface Picture { text: string; width: number; height: number } // SVG and its size [px]
 
-/**
- * Draw plots below each other.
- *
- * @param {Chart[]} charts
- * @returns {Promise<Picture>}
- */
-export async function picturesOf(charts) {
+/** Draw plots below each other. */
+export async function picturesOf(charts: Chart[]): Promise<Picture> {
   const library = await loadPlotly();
   const row_px = HEAD_PX + HEIGHT_PX;
   const height = row_px * charts.length;
@@ -41,18 +36,16 @@ export async function picturesOf(charts) {
   return { text, width: WIDTH_PX, height };
 }
 
-/** @param {string} text */
-function escaped(text) {
+function escaped(text: string) {
   return text.replaceAll('&', '&amp;').replaceAll('<', '&lt;').replaceAll('>', '&gt;');
 }
 
 /**
  * Convert a picture to pixels.
  *
- * @param {Picture} picture
- * @returns {Promise<Blob>} PNG
+ * @returns PNG
  */
-export async function rasterised({ text, width, height }) {
+export async function rasterised({ text, width, height }: Picture): Promise<Blob> {
   const address = URL.createObjectURL(new Blob([text], { type: 'image/svg+xml' }));
   try {
     const image = new Image();

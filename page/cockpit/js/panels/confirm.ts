@@ -4,18 +4,14 @@
 
 import { element, setText } from '../dom.js';
 
-/** @type {ReturnType<typeof build>|null} */
-let dialog = null;
+let dialog: ReturnType<typeof build> | null = null;
 
 /**
  * Ask, and wait for the answer.
  *
- * @param {string} question
- * @param {string} consequence
- * @param {string} verb on the button that confirms
- * @returns {Promise<boolean>}
+ * @param verb on the button that confirms
  */
-export function confirm(question, consequence, verb) {
+export function confirm(question: string, consequence: string, verb: string): Promise<boolean> {
   dialog ??= build();
   return dialog.ask(question, consequence, verb);
 }
@@ -31,13 +27,7 @@ function build() {
   no.addEventListener('click', () => node.close('no'));
   yes.addEventListener('click', () => node.close('yes'));
   return {
-    /**
-     * @param {string} question
-     * @param {string} consequence
-     * @param {string} verb
-     * @returns {Promise<boolean>}
-     */
-    ask(question, consequence, verb) {
+    ask(question: string, consequence: string, verb: string): Promise<boolean> {
       setText(title, question);
       setText(text, consequence);
       setText(yes, verb);

@@ -7,15 +7,14 @@ import { element, setAttribute, setText } from '../dom.js';
 import { clockTime, fixed, NONE } from './format.js';
 import { HistoryPanel } from './history.js';
 
-/** @import { Worst } from '../criticality.js' */
-/** @import { Criticality, Exposure, Measure } from '../messages.js' */
-/** @import { Store } from '../store.js' */
-/** @import { Quantity } from './quantities.js' */
+import type { Worst } from '../criticality.js';
+import type { Criticality, Exposure, Measure } from '../messages.js';
+import type { Store } from '../store.js';
+import type { Quantity } from './quantities.js';
 
 const PERIOD_MS = 200;
 
-/** @type {Quantity[]} */
-const QUANTITIES = [
+const QUANTITIES: Quantity[] = [
   {
     key: 'ttc', title: 'TTC', unit: 's', digits: 1, range: [0, 10],
     lines: [{ critical: 'ttc' }, { critical: 'ttc_2d', name: 'any direction' },
@@ -45,18 +44,16 @@ const TWICE = 'thw';
 /**
  * Make the panel.
  *
- * @param {HTMLElement} root #panel-criticality
- * @param {Store} store
- * @returns {HistoryPanel} its plots
+ * @param root #panel-criticality
+ * @returns its plots
  */
-export function createCriticality(root, store) {
+export function createCriticality(root: HTMLElement, store: Store): HistoryPanel {
   const tables = element('div', {});
   const plots = element('div', { class: 'history' });
   const hint = element('p', { class: 'hint', text: 'No other is near.' });
   root.append(plots, hint, tables);
   const panel = new HistoryPanel(plots, store, QUANTITIES);
-  /** @type {Map<string, VehicleTable>} */
-  const shown = new Map();
+  const shown = new Map<string, VehicleTable>();
   const update = () => {
     if (root.hidden || store.scene === null) {
       return;
@@ -79,17 +76,12 @@ export function createCriticality(root, store) {
 /** One vehicle's measures: now, and at worst. */
 class VehicleTable {
   #id;
-  /** @type {Map<Measure, HTMLElement[]>} */
-  #cells = new Map();
-  /** @type {Map<string, HTMLElement>} */
-  #sums = new Map();
+  #cells = new Map<Measure, HTMLElement[]>();
+  #sums = new Map<string, HTMLElement>();
+  root;
 
-  /**
-   * @param {string} id of the vehicle
-   * @param {Measure[]} measures
-   * @param {Exposure[]} exposures
-   */
-  constructor(id, measures, exposures) {
+  /** @param id of the vehicle */
+  constructor(id: string, measures: Measure[], exposures: Exposure[]) {
     this.#id = id;
     const rows = measures.filter(({ name }) => name !== TWICE).map((measure) => {
       const cells = [element('td', {}), element('td', {}), element('td', {})];
@@ -114,11 +106,8 @@ class VehicleTable {
         element('tbody', {}, ...sums)));
   }
 
-  /**
-   * @param {Store} store
-   * @param {number} t [s]
-   */
-  update(store, t) {
+  /** @param t [s] */
+  update(store: Store, t: number) {
     const index = store.vehicleIndex(this.#id);
     const told = store.status?.criticality?.[this.#id];
     const limits = limitsOf(store.measures, store.status);
@@ -139,16 +128,9 @@ class VehicleTable {
   }
 }
 
-/**
- * Return the worst value; of a live run as the node reports it, from its start on.
- *
- * @param {Store} store
- * @param {Criticality|undefined} told
- * @param {Measure} measure
- * @param {Worst|null} seen
- * @returns {{value: number, of: string, t: number}|null}
- */
-function worstOf(store, told, { name, worst }, seen) {
+/** Return the worst value; of a live run as the node reports it, from its start on. */
+function worstOf(store: Store, told: Criticality | undefined, { name, worst }: Measure,
+  seen: Worst | null): { value: number; of: string; t: number } | null {
   const known = told?.worst[name];
   const own = seen === null ? null : { ...seen, of: nameOf(store, seen.of) };
   if (!known || known.value === null || known.t === null) {
@@ -158,11 +140,8 @@ function worstOf(store, told, { name, worst }, seen) {
     ? own : { value: known.value, of: known.of, t: known.t };
 }
 
-/**
- * @param {Store} store
- * @param {number} column of vehicles, then objects
- */
-function nameOf(store, column) {
+/** @param column of vehicles, then objects */
+function nameOf(store: Store, column: number) {
   const { vehicles = [], objects = [] } = store.scene ?? {};
   return (vehicles[column] ?? objects[column - vehicles.length])?.id ?? NONE;
 }

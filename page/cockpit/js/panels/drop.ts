@@ -5,14 +5,12 @@
 /**
  * Accept files that are dropped on the page, so that the browser does not open them.
  *
- * @param {HTMLElement} zone gets data-over while a drop would be accepted
- * @param {(files: File[]) => void} taken gets the files
+ * @param zone gets data-over while a drop would be accepted
+ * @param taken gets the files
  */
-export function acceptDrops(zone, taken) {
-  /** @param {DragEvent} event */
-  const hasFiles = (event) => [...event.dataTransfer?.types ?? []].includes('Files');
-  /** @param {DragEvent} event */
-  const over = (event) => {
+export function acceptDrops(zone: HTMLElement, taken: (files: File[]) => void) {
+  const hasFiles = (event: DragEvent) => [...event.dataTransfer?.types ?? []].includes('Files');
+  const over = (event: DragEvent) => {
     if (hasFiles(event)) {
       event.preventDefault();
       if (event.dataTransfer !== null) {
@@ -21,8 +19,7 @@ export function acceptDrops(zone, taken) {
       zone.dataset.over = 'yes';
     }
   };
-  /** @param {DragEvent} event */
-  const leave = (event) => {
+  const leave = (event: DragEvent) => {
     // Every element fires dragleave; only leaving the page has no related target.
     if (event.relatedTarget === null) {
       delete zone.dataset.over;

@@ -4,20 +4,19 @@
 
 import { fixed, NONE } from './format.js';
 
-/** @import { EventAction, EventCondition, GameEvent, ObstacleAction } from '../messages.js' */
-/** @import { TrafficAction } from '../messages.js' */
+import type {
+  EventAction, EventCondition, GameEvent, ObstacleAction, TrafficAction,
+} from '../messages.js';
 
-/** @type {Record<string, string>} */
-const THINGS = {
+const THINGS: Record<string, string> = {
   constructionZone: 'a construction zone', parkedVehicle: 'a parked vehicle',
   roadBoundary: 'a barrier', unknown: 'an obstacle',
 };
 const KMH = 3.6;
 
-/**
- * @type {{[Kind in EventAction['kind']]: (event: Extract<EventAction, {kind: Kind}>) => string}}
- */
-const ACTIONS = {
+const ACTIONS: {
+  [Kind in EventAction['kind']]: (event: Extract<EventAction, { kind: Kind }>) => string
+} = {
   release: (event) => `Releases obstacle ${event.object}, which waits until then`,
   brake: (event) => `Obstacle ${event.object} brakes at ${fixed(event.deceleration, 1)} m/s² to `
     + (event.speed > 0 ? speed(event.speed) : 'a stop'),
@@ -33,29 +32,28 @@ const ACTIONS = {
     : `Stops the planner of ${event.av}: it is asked for no plan`),
 };
 
-/** @type {Record<EventAction['kind'], string>} */
-const TITLES = {
+const TITLES: Record<EventAction['kind'], string> = {
   release: 'Release', brake: 'Brake', obstacle: 'Obstacle', speed_limit: 'Speed limit',
   traffic: 'Traffic', plan_display: 'Plan display', planner: 'Planner',
   planner_run: 'Planner stop or go',
 };
 
 /**
- * @param {GameEvent} event an entry of scene.events
- * @returns {string} its kind in words
+ * @param event an entry of scene.events
+ * @returns its kind in words
  */
-export function eventKind(event) {
+export function eventKind(event: GameEvent): string {
   return Object.hasOwn(TITLES, event.kind) ? TITLES[event.kind]
     : String(event.kind ?? '').replaceAll('_', ' ');
 }
 
 /**
- * @param {GameEvent} event an entry of scene.events
- * @returns {string} a sentence on what it does; for an unknown kind its parameters
+ * @param event an entry of scene.events
+ * @returns a sentence on what it does; for an unknown kind its parameters
  */
-export function eventWords(event) {
+export function eventWords(event: GameEvent): string {
   if (Object.hasOwn(ACTIONS, event.kind)) {
-    const words = /** @type {(event: GameEvent) => string} */ (ACTIONS[event.kind]);
+    const words = ACTIONS[event.kind] as (event: GameEvent) => string;
     return `${words(event)}.`;
   }
   return Object.entries(event)
@@ -65,10 +63,10 @@ export function eventWords(event) {
 }
 
 /**
- * @param {EventCondition|null|undefined} when the condition of an event
- * @returns {string} the condition in words; empty if only the button fires it
+ * @param when the condition of an event
+ * @returns the condition in words; empty if only the button fires it
  */
-export function conditionWords(when) {
+export function conditionWords(when: EventCondition | null | undefined): string {
   if (!when) {
     return '';
   }
@@ -85,22 +83,15 @@ export function conditionWords(when) {
     + `(${fixed(when.x, 0)}, ${fixed(when.y, 0)})`;
 }
 
-/** @param {number} value */
-function speed(value) {
+function speed(value: number) {
   const shown = fixed(value * KMH, 0);
   return shown === NONE ? 'another speed' : `${shown} km/h`;
 }
 
-/** @param {TrafficAction} event */
-function driving(event) {
-  /** @type {string[]} */
-  const said = [];
-  /**
-   * @template {keyof TrafficAction} Name
-   * @param {Name} name
-   * @param {(value: NonNullable<TrafficAction[Name]>) => string} words
-   */
-  const add = (name, words) => {
+function driving(event: TrafficAction) {
+  const said: string[] = [];
+  const add = <Name extends keyof TrafficAction>(name: Name,
+    words: (value: NonNullable<TrafficAction[Name]>) => string) => {
     const value = event[name];
     if (value !== undefined && value !== null) {
       said.push(words(value));
@@ -120,13 +111,11 @@ function driving(event) {
   return said.join(', ');
 }
 
-/** @param {ObstacleAction} event */
-function place(event) {
+function place(event: ObstacleAction) {
   return `at (${fixed(event.x, 0)}, ${fixed(event.y, 0)})`;
 }
 
-/** @param {number[]|undefined} ids */
-function lanelets(ids) {
+function lanelets(ids: number[] | undefined) {
   if (!ids?.length) {
     return 'all roads';
   }
@@ -134,9 +123,9 @@ function lanelets(ids) {
 }
 
 /**
- * @param {string|null|undefined} spec of a planner or a driver
- * @returns {string} the same with the name instead of the path of a file in it
+ * @param spec of a planner or a driver
+ * @returns the same with the name instead of the path of a file in it
  */
-export function baseName(spec) {
+export function baseName(spec: string | null | undefined): string {
   return String(spec ?? '').replace(/(?:[^\s:]*\/)+/g, '');
 }

@@ -8,9 +8,9 @@ import { conditionWords, eventKind, eventWords } from './event_words.js';
 import { clockTime, oneLine } from './format.js';
 import { icon } from './icons.js';
 
-/** @import { Connection } from '../connection.js' */
-/** @import { FiredEvent, GameEvent } from '../messages.js' */
-/** @import { Store } from '../store.js' */
+import type { Connection } from '../connection.js';
+import type { FiredEvent, GameEvent } from '../messages.js';
+import type { Store } from '../store.js';
 
 const BY = new Map([['trigger', 'by button'], ['condition', 'by its condition'],
   ['driver', 'by its driver'], ['contact', 'stopped by it']]);
@@ -18,21 +18,18 @@ const BY = new Map([['trigger', 'by button'], ['condition', 'by its condition'],
 /**
  * Make the panel.
  *
- * @param {HTMLElement} root #panel-events
- * @param {Store} store
- * @param {Connection} connection
- * @returns {{trigger: (name: string) => Promise<void>}} trigger an event by its name
+ * @param root #panel-events
+ * @returns trigger an event by its name
  */
-export function createEvents(root, store, connection) {
+export function createEvents(root: HTMLElement, store: Store,
+  connection: Connection): { trigger: (name: string) => Promise<void> } {
   const list = element('ul', { class: 'event-list' });
   const log = element('ol', { class: 'event-log' });
   const logTitle = element('h2', { text: 'What has happened' });
   const empty = element('p', { class: 'hint' });
   root.append(element('h2', { text: 'Trigger an event' }), empty, list, logTitle, log);
-  /** @type {Map<string, ReturnType<typeof makeCard>>} */
-  const cards = new Map();
-  /** @type {Set<string>} */
-  const asked = new Set();
+  const cards = new Map<string, ReturnType<typeof makeCard>>();
+  const asked = new Set<string>();
 
   const update = () => {
     const fired = new Map(store.fired.map((entry) => [entry.name, entry]));
@@ -58,8 +55,7 @@ export function createEvents(root, store, connection) {
       : 'This game has no events. They are written under "events" in the game file.');
     update();
   };
-  /** @param {string} name */
-  const trigger = async (name) => {
+  const trigger = async (name: string) => {
     asked.add(name);
     cards.get(name)?.refused('');
     update();
@@ -87,25 +83,16 @@ export function createEvents(root, store, connection) {
   return { trigger };
 }
 
-/** @param {Store} store */
-function steerable(store) {
+function steerable(store: Store) {
   return store.mode === 'live' && store.connected && store.status?.run !== 'ended'
     && store.rights.directs;
 }
 
-/**
- * @param {FiredEvent} entry
- * @param {Store} store
- */
-function timeOf(entry, store) {
+function timeOf(entry: FiredEvent, store: Store) {
   return entry.n * (store.scene?.time.dt_s ?? NaN);
 }
 
-/**
- * @param {GameEvent} event
- * @param {() => void} press
- */
-function makeCard(event, press) {
+function makeCard(event: GameEvent, press: () => void) {
   const label = oneLine(event.label || event.name);
   const button = element('button', { type: 'button', class: 'primary', on: { click: press } });
   const state = element('p', { class: 'event-state' });
@@ -121,17 +108,10 @@ function makeCard(event, press) {
       element('p', { text: eventWords(event) }),
       by ? element('p', { class: 'dim event-when' }, icon('clock'), `Also ${by}.`) : null,
       state, error),
-    /** @param {string} text */
-    refused: (text) => setText(error, text),
-    /** @param {string} reason why it cannot be pressed, or empty */
-    explain: (reason) => setAttribute(button, 'title', reason || null),
-    /**
-     * @param {FiredEvent|undefined} fired
-     * @param {boolean} asked
-     * @param {boolean} can
-     * @param {Store} store
-     */
-    update(fired, asked, can, store) {
+    refused: (text: string) => setText(error, text),
+    /** @param reason why it cannot be pressed, or empty */
+    explain: (reason: string) => setAttribute(button, 'title', reason || null),
+    update(fired: FiredEvent | undefined, asked: boolean, can: boolean, store: Store) {
       button.disabled = fired !== undefined || asked || !can;
       button.setAttribute('aria-label', `Trigger ${label}`);
       const text = fired ? 'Done' : asked ? 'Sent …' : 'Trigger';

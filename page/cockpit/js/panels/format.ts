@@ -6,11 +6,10 @@
 export const NONE = '–';
 
 /**
- * @param {number|null|undefined} value
- * @param {number} digits after the point
- * @returns {string} with a true minus sign; NONE if it is not a number
+ * @param digits after the point
+ * @returns with a true minus sign; NONE if it is not a number
  */
-export function fixed(value, digits) {
+export function fixed(value: number | null | undefined, digits: number): string {
   if (value === null || value === undefined || !Number.isFinite(Number(value))) {
     return NONE;
   }
@@ -20,36 +19,36 @@ export function fixed(value, digits) {
 }
 
 /**
- * @param {number|null|undefined} seconds simulation time [s]
- * @returns {string} as the clock in the header shows it: 65.2 s
+ * @param seconds simulation time [s]
+ * @returns as the clock in the header shows it: 65.2 s
  */
-export function clockTime(seconds) {
+export function clockTime(seconds: number | null | undefined): string {
   return Number.isFinite(seconds) ? `${fixed(seconds, 1)} s` : NONE;
 }
 
 /**
- * @param {number|null|undefined} value a whole number
- * @returns {string} with thin spaces between thousands
+ * @param value a whole number
+ * @returns with thin spaces between thousands
  */
-export function count(value) {
+export function count(value: number | null | undefined): string {
   return fixed(value, 0).replace(/\B(?=(\d{3})+(?!\d))/g, '\u202f');
 }
 
 /**
- * @param {number} number how many
- * @param {string} one the noun in the singular
- * @param {string} [many] the plural; by default with an s
- * @returns {string} "1 vehicle", "3 vehicles"
+ * @param number how many
+ * @param one the noun in the singular
+ * @param many the plural; by default with an s
+ * @returns "1 vehicle", "3 vehicles"
  */
-export function plural(number, one, many = `${one}s`) {
+export function plural(number: number, one: string, many = `${one}s`): string {
   return `${number} ${number === 1 ? one : many}`;
 }
 
 /**
- * @param {unknown} error what was thrown
- * @returns {string} its message
+ * @param error what was thrown
+ * @returns its message
  */
-export function errorText(error) {
+export function errorText(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
@@ -59,19 +58,13 @@ const TURNING = /[\u0590-\u08ff\u200e\u200f\u202a-\u202e\u2066-\u2069]/;
 /**
  * Isolate a foreign text, so that its direction does not affect its neighbours.
  *
- * @param {string} text
- * @returns {string} the same, or between the signs that isolate it (Unicode's FSI and PDI)
+ * @returns the same, or between the signs that isolate it (Unicode's FSI and PDI)
  */
-export function isolated(text) {
+export function isolated(text: string): string {
   return TURNING.test(text) ? `\u2068${text}\u2069` : text;
 }
 
-/**
- * Convert the text of a server or an exception to one readable line.
- *
- * @param {unknown} text
- * @returns {string}
- */
-export function oneLine(text) {
+/** Convert the text of a server or an exception to one readable line. */
+export function oneLine(text: unknown): string {
   return isolated(String(text ?? '').replace(/\s+/g, ' ').trim());
 }

@@ -12,11 +12,11 @@ import { loadPlotly } from './plotly.js';
 import { QUANTITIES, traces } from './quantities.js';
 import { HealthLog } from './series.js';
 
-/** @import { SceneVehicle } from '../messages.js' */
-/** @import { Store } from '../store.js' */
-/** @import { ChartView } from './chart.js' */
-/** @import { Plotly } from './plotly.js' */
-/** @import { PlotData, Quantity } from './quantities.js' */
+import type { SceneVehicle } from '../messages.js';
+import type { Store } from '../store.js';
+import type { ChartView } from './chart.js';
+import type { Plotly } from './plotly.js';
+import type { PlotData, Quantity } from './quantities.js';
 
 const WINDOWS_S = [10, 30, 120];
 const KEPT_S = 120;
@@ -26,8 +26,7 @@ const PERIOD_MS = 400;
 // The share of a replay's window that lies after the shown time.
 const AHEAD = 0.35;
 // Colours by role in the order of the vehicles; the first two are those of the map.
-/** @type {Record<SceneVehicle['role'], string[]>} */
-const COLOURS = {
+const COLOURS: Record<SceneVehicle['role'], string[]> = {
   human: ['human', 'series-1', 'series-2'], autonomous: ['av', 'series-3', 'series-4'],
 };
 const THEME = [...COLOURS.human, ...COLOURS.autonomous, 'accent', 'border', 'text-dim', 'surface',
@@ -44,24 +43,17 @@ export class HistoryPanel {
   #store;
   #quantities;
   #health = new HealthLog(KEPT_S);
-  /** @type {Map<string, Chart>} */
-  #charts = new Map();
-  /** @type {Set<Element>} */
-  #inView = new Set();
-  /** @type {Chart[]} */
-  #waiting = [];
-  /** @type {PlotData['vehicles']|null} */
-  #pasts = null;
+  #charts = new Map<string, Chart>();
+  #inView = new Set<Element>();
+  #waiting: Chart[] = [];
+  #pasts: PlotData['vehicles'] | null = null;
   #rem_px = 16;
-  /** @type {Set<string>} */
-  #selected = new Set();
+  #selected = new Set<string>();
   #window_s = Number(recall('window')) || 30;
-  /** @type {number|null} */
-  #frozen = null;
+  #frozen: number | null = null;
   #due_ms = 0;
   #loading = false;
-  /** @type {Record<string, string>} */
-  #theme = {};
+  #theme: Record<string, string> = {};
   #chosen = false;
   #chips = element('div', { class: 'chips', role: 'group', 'aria-label': 'Vehicles' });
   #windows = element('div', { class: 'segments', role: 'group', 'aria-label': 'Time window' });
@@ -74,11 +66,10 @@ export class HistoryPanel {
   #body = element('div', { class: 'charts' });
 
   /**
-   * @param {HTMLElement} root in a panel, or the panel
-   * @param {Store} store
-   * @param {Quantity[]} quantities that are plotted
+   * @param root in a panel, or the panel
+   * @param quantities that are plotted
    */
-  constructor(root, store, quantities) {
+  constructor(root: HTMLElement, store: Store, quantities: Quantity[]) {
     this.#root = root;
     this.#store = store;
     this.#quantities = quantities;
@@ -100,8 +91,7 @@ export class HistoryPanel {
     if (store.scene !== null) {
       this.#newScene();
     }
-    /** @param {number} now_ms */
-    const frame = (now_ms) => {
+    const frame = (now_ms: number) => {
       this.#frame(now_ms);
       requestAnimationFrame(frame);
     };
@@ -123,16 +113,16 @@ export class HistoryPanel {
     return this.charts.flatMap((chart) => chart.rows);
   }
 
-  /** @param {boolean} on whether the plots stand still for inspection */
-  freeze(on) {
+  /** @param on whether the plots stand still for inspection */
+  freeze(on: boolean) {
     this.#frozen = on ? this.#now() : null;
     setAttribute(this.#freeze, 'aria-pressed', String(on));
     setText(this.#freeze, on ? 'Go on' : 'Freeze');
     this.#redrawAll();
   }
 
-  /** @param {number} seconds how much time the plots show */
-  setWindow(seconds) {
+  /** @param seconds how much time the plots show */
+  setWindow(seconds: number) {
     this.#window_s = seconds;
     remember('window', String(seconds));
     for (const button of childrenOf(this.#windows)) {
@@ -142,10 +132,10 @@ export class HistoryPanel {
   }
 
   /**
-   * @param {string} id of a vehicle
-   * @param {boolean} on whether it is plotted
+   * @param id of a vehicle
+   * @param on whether it is plotted
    */
-  select(id, on) {
+  select(id: string, on: boolean) {
     if (on) {
       this.#selected.add(id);
     } else {
@@ -209,8 +199,7 @@ export class HistoryPanel {
 
   #lineColours() {
     const seen = { human: 0, autonomous: 0 };
-    /** @type {(vehicle: SceneVehicle) => [string, string]} */
-    const colourOf = ({ id, role }) => {
+    const colourOf = ({ id, role }: SceneVehicle): [string, string] => {
       const names = COLOURS[role] ?? COLOURS.human;
       const name = names[seen[role] % names.length];
       seen[role] += 1;
@@ -229,8 +218,7 @@ export class HistoryPanel {
     this.#waiting = [...this.#charts.values()].filter((chart) => this.#inView.has(chart.root));
   }
 
-  /** @param {number} now_ms */
-  #frame(now_ms) {
+  #frame(now_ms: number) {
     if (this.#root.closest('[hidden]') || document.hidden) {
       return;
     }
@@ -276,8 +264,7 @@ export class HistoryPanel {
     }
   }
 
-  /** @param {Plotly} library */
-  #makeCharts(library) {
+  #makeCharts(library: Plotly) {
     const observer = new IntersectionObserver((entries) => {
       for (const entry of entries) {
         if (entry.isIntersecting) {
@@ -301,16 +288,11 @@ export class HistoryPanel {
     }).observe(this.#body);
   }
 
-  /**
-   * @param {Chart} chart
-   * @param {PlotData['vehicles']} vehicles
-   */
-  #draw(chart, vehicles) {
+  #draw(chart: Chart, vehicles: PlotData['vehicles']) {
     const shown = this.#frozen ?? this.#now();
     const replay = this.#store.mode === 'replay';
     const to = Math.max(replay ? shown + AHEAD * this.#window_s : shown, this.#window_s);
-    /** @type {ChartView} */
-    const view = {
+    const view: ChartView = {
       shown, to, from: to - this.#window_s, cursor: replay ? shown : null,
       frozen: this.#frozen !== null,
       rem: this.#rem_px,
@@ -325,12 +307,8 @@ export class HistoryPanel {
     }, view), view);
   }
 
-  /**
-   * Return the data of all plots of one round.
-   *
-   * @returns {PlotData['vehicles']}
-   */
-  #gather() {
+  /** Return the data of all plots of one round. */
+  #gather(): PlotData['vehicles'] {
     const colours = this.#lineColours();
     const vehicles = this.#store.scene?.vehicles ?? [];
     return vehicles.flatMap(({ id, role }, index) => (this.#selected.has(id) ? [{
@@ -340,29 +318,20 @@ export class HistoryPanel {
   }
 }
 
-/**
- * @param {HTMLElement} root
- * @returns {HTMLElement} the element that is hidden and scrolled together with it
- */
-function panelOf(root) {
+/** @returns the element that is hidden and scrolled together with it */
+function panelOf(root: HTMLElement): HTMLElement {
   return root.closest('.panel') ?? root;
 }
 
-/**
- * @param {HTMLElement} root
- * @returns {HTMLElement[]}
- */
-function childrenOf(root) {
-  return /** @type {HTMLElement[]} */ ([...root.children]);
+function childrenOf(root: HTMLElement): HTMLElement[] {
+  return [...root.children] as HTMLElement[];
 }
 
 /**
  * Make the panel.
  *
- * @param {HTMLElement} root #panel-history
- * @param {Store} store
- * @returns {HistoryPanel}
+ * @param root #panel-history
  */
-export function createHistory(root, store) {
+export function createHistory(root: HTMLElement, store: Store): HistoryPanel {
   return new HistoryPanel(root, store, QUANTITIES);
 }

@@ -5,8 +5,7 @@
 import { svg } from '../dom.js';
 
 // Every alarm has its own silhouette, so that none depends on its colour alone.
-/** @type {Record<string, string>} */
-const PATHS = {
+const PATHS: Record<string, string> = {
   collision: 'M12 1.5l2.6 5.4 5.7-2-2 5.7 4.2 2.9-5 2.1 1 5.9-5.6-2.2-3.6 4.2-1.9-5.6-5.9.6'
     + ' 3.3-4.9L2 9.6l5.9-.9zM9.5 9.5l5 5M14.5 9.5l-5 5',
   off_road: 'M3 22L8 2M21 22L16 2M12 3v3M12 10v3M15.5 15l5.5 5M21 15l-5.5 5',
@@ -45,10 +44,10 @@ const PATHS = {
 /**
  * Make an icon.
  *
- * @param {string} name one of PATHS
- * @returns {SVGElement} decoration only: hidden from screen readers
+ * @param name one of PATHS
+ * @returns decoration only: hidden from screen readers
  */
-export function icon(name) {
+export function icon(name: string): SVGElement {
   return svg('svg', {
     viewBox: '0 0 24 24', class: `line-icon line-icon-${name}`, 'aria-hidden': 'true',
   }, svg('path', { d: PATHS[name] ?? PATHS.info }));

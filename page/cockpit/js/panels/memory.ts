@@ -5,10 +5,10 @@
 const PREFIX = 'crgame.';
 
 /**
- * @param {string} name of a preference
- * @returns {string} its value; empty if none was kept or the browser keeps nothing
+ * @param name of a preference
+ * @returns its value; empty if none was kept or the browser keeps nothing
  */
-export function recall(name) {
+export function recall(name: string): string {
   try {
     return window.localStorage.getItem(PREFIX + name) ?? '';
   } catch {
@@ -18,10 +18,10 @@ export function recall(name) {
 }
 
 /**
- * @param {string} name of a preference
- * @param {string} value to keep; an empty one forgets it
+ * @param name of a preference
+ * @param value to keep; an empty one forgets it
  */
-export function remember(name, value) {
+export function remember(name: string, value: string) {
   try {
     if (value === '') {
       window.localStorage.removeItem(PREFIX + name);

@@ -4,21 +4,18 @@
 
 import { clockTime, oneLine } from './format.js';
 
-/** @import { Store } from '../store.js' */
+import type { Store } from '../store.js';
 
-/** @typedef {{t: number, touched: boolean, text: string}} Mishap */
+export interface Mishap { t: number; touched: boolean; text: string }
 
 /**
  * Return the contacts and road departures of a vehicle, in the order of time.
  *
- * @param {Store} store
- * @param {string} mine the vehicle
- * @returns {Mishap[]}
+ * @param mine the vehicle
  */
-export function mishapsOf({ status }, mine) {
+export function mishapsOf({ status }: Store, mine: string): Mishap[] {
   const { contacts = [], departures = [] } = status ?? {};
-  /** @type {(t: number, other: string) => Mishap} */
-  const touched = (t, other) => ({
+  const touched = (t: number, other: string): Mishap => ({
     t, touched: true, text: `You touched ${oneLine(other)} at ${clockTime(t)}.` });
   return [
     ...contacts.filter((item) => item.vehicle === mine || item.with === mine).map(

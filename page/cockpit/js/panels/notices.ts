@@ -6,26 +6,22 @@ import { element, setText } from '../dom.js';
 import { oneLine } from './format.js';
 import { icon } from './icons.js';
 
-/** @import { NoticeLevel } from '../messages.js' */
-/** @import { Store } from '../store.js' */
+import type { NoticeLevel } from '../messages.js';
+import type { Store } from '../store.js';
 
 // How long a message stays [ms]; an error stays until it is closed or many have followed.
-/** @type {Record<NoticeLevel, number>} */
-const STAYS_MS = { info: 5000, warn: 9000, error: 0 };
+const STAYS_MS: Record<NoticeLevel, number> = { info: 5000, warn: 9000, error: 0 };
 const MOST = 4;
 
 /**
  * Show the notices of the server and of the page's own parts.
  *
- * @param {HTMLElement} root #notices
- * @param {Store} store
- * @returns {{show: (level: NoticeLevel, text: string) => void}}
+ * @param root #notices
  */
-export function createNotices(root, store) {
-  /** @type {Map<string, Toast>} */
-  const shown = new Map();
-  /** @type {(level: NoticeLevel, text: string) => void} */
-  const show = (level, text) => {
+export function createNotices(root: HTMLElement,
+  store: Store): { show: (level: NoticeLevel, text: string) => void } {
+  const shown = new Map<string, Toast>();
+  const show = (level: NoticeLevel, text: string) => {
     const known = Object.hasOwn(STAYS_MS, level) ? level : 'info';
     const line = oneLine(text);
     const key = `${known} ${line}`;
@@ -49,13 +45,9 @@ class Toast {
   #stays_ms;
   #closed;
   #count = element('span', { class: 'toast-count' });
+  root;
 
-  /**
-   * @param {NoticeLevel} level
-   * @param {string} text
-   * @param {() => void} closed
-   */
-  constructor(level, text, closed) {
+  constructor(level: NoticeLevel, text: string, closed: () => void) {
     this.#stays_ms = STAYS_MS[level];
     this.#closed = closed;
     this.root = element('div', {

@@ -12,33 +12,53 @@ import { mishapsOf } from './mishaps.js';
 import { figures, fileList, table } from './outcome_card.js';
 import { RunResult } from './run_result.js';
 
-/** @import { Connection } from '../connection.js' */
-/** @import { Reply, RunAction, RunState } from '../messages.js' */
-/** @import { Result } from './outcome_card.js' */
-/** @import { Store } from '../store.js' */
+import type { Connection } from '../connection.js';
+import type { Reply, RunAction, RunState } from '../messages.js';
+import type { Result } from './outcome_card.js';
+import type { Store } from '../store.js';
 
 // How long a mishap is shown to its driver while the run continues [ms].
 const MISHAP_MS = 10000;
 
-/**
- * Why this person cannot do each of these; empty if they can.
- *
- * @typedef {Record<'start'|'pause'|'stop'|'reset'|'choose', string>} Against
- */
+/** Why this person cannot do each of these; empty if they can. */
+export type Against = Record<'start' | 'pause' | 'stop' | 'reset' | 'choose', string>;
 
-/**
- * The content by phase: the run is over or held for inspection, the card was closed, a driver
- * is awaited, everything is ready, or this page's driver had a contact or left the road.
- *
- * @typedef {{phase: 'over'|'held', connected: boolean, against: Against} & Result} Card
- * @typedef {{phase: 'driver', seat: string, run: RunState, holder: string|null,
- *   holderName: string, me: string, refused: string, against: Against}} Awaiting
- * @typedef {{phase: 'ready'|'none', run: RunState, mine: string|null, against: Against}} Ready
- * @typedef {{phase: 'mishap', run: RunState, text: string, stopped: boolean, against: Against
- *   }} MishapFacts
- * @typedef {{phase: 'none', run?: undefined}|{phase: 'closed'}|Card|Awaiting|Ready|MishapFacts
- *   } Facts
- */
+// The content by phase: the run is over or held for inspection, the card was closed, a driver
+// is awaited, everything is ready, or this page's driver had a contact or left the road.
+export interface Card extends Result {
+  phase: 'over' | 'held';
+  connected: boolean;
+  against: Against;
+}
+
+export interface Awaiting {
+  phase: 'driver';
+  seat: string;
+  run: RunState;
+  holder: string | null;
+  holderName: string;
+  me: string;
+  refused: string;
+  against: Against;
+}
+
+export interface Ready {
+  phase: 'ready' | 'none';
+  run: RunState;
+  mine: string | null;
+  against: Against;
+}
+
+export interface MishapFacts {
+  phase: 'mishap';
+  run: RunState;
+  text: string;
+  stopped: boolean;
+  against: Against;
+}
+
+export type Facts = { phase: 'none'; run?: undefined } | { phase: 'closed' } | Card | Awaiting
+  | Ready | MishapFacts;
 
 /** The card; one per page. */
 class Outcome {
@@ -54,12 +74,7 @@ class Outcome {
   #told = 0;
   #mishapTimer = 0;
 
-  /**
-   * @param {HTMLElement} root
-   * @param {Store} store
-   * @param {Connection} connection
-   */
-  constructor(root, store, connection) {
+  constructor(root: HTMLElement, store: Store, connection: Connection) {
     this.#root = root;
     this.#store = store;
     this.#connection = connection;
@@ -71,8 +86,7 @@ class Outcome {
         this.#result.clearFiles();
       }
     });
-    for (const name of /** @type {const} */ (
-      ['hello', 'you', 'scene', 'seats', 'status', 'connection'])) {
+    for (const name of ['hello', 'you', 'scene', 'seats', 'status', 'connection'] as const) {
       store.on(name, () => this.#show());
     }
     store.on('epoch', () => {
@@ -108,17 +122,12 @@ class Outcome {
     setAttribute(this.#root, 'hidden', facts.phase === 'none');
     this.#root.replaceChildren(...this.#content(facts));
     if (focused) {
-      /** @type {HTMLElement|null} */
-      const again = this.#root.querySelector(`[data-action="${focused}"]`);
+      const again: HTMLElement | null = this.#root.querySelector(`[data-action="${focused}"]`);
       again?.focus();
     }
   }
 
-  /**
-   * @param {Facts} facts
-   * @returns {Node[]}
-   */
-  #content(facts) {
+  #content(facts: Facts): Node[] {
     switch (facts.phase) {
       case 'none': return [];
       case 'over': case 'held': return this.#card(facts);
@@ -131,8 +140,7 @@ class Outcome {
     }
   }
 
-  /** @returns {Facts} */
-  #facts() {
+  #facts(): Facts {
     const { status, scene, mode, connected, seats, me } = this.#store;
     if (mode !== 'live' || status === null || scene === null) {
       return { phase: 'none' };
@@ -169,23 +177,17 @@ class Outcome {
     return { phase: status.run === 'paused' ? 'ready' : 'none', run: status.run, mine, against };
   }
 
-  /** @returns {Against} */
-  #against() {
+  #against(): Against {
     const { connected, status } = this.#store;
     const gone = !connected ? 'There is no connection to the simulation.'
       : status?.run === 'ended' && !status.stays ? 'The program ends with this run.' : '';
-    const [start, pause, stop, reset] = /** @type {const} */ (
-      ['start', 'pause', 'stop', 'reset']).map(
+    const [start, pause, stop, reset] = (['start', 'pause', 'stop', 'reset'] as const).map(
       (action) => gone || reasonAgainstOrder(this.#store, action));
     const choose = gone || reasonAgainst(this.#store, 'direct', 'choose what is run');
     return { start, pause, stop, reset, choose };
   }
 
-  /**
-   * @param {MishapFacts} facts
-   * @returns {Node[]}
-   */
-  #mishap({ run, text, stopped, against }) {
+  #mishap({ run, text, stopped, against }: MishapFacts): Node[] {
     const refused = run === 'running' ? against.pause : '';
     clearTimeout(this.#mishapTimer);
     if (run === 'running') {
@@ -224,8 +226,8 @@ class Outcome {
     }
   }
 
-  /** @returns {Promise<boolean>} whether this run stands still now, paused if necessary */
-  async #still() {
+  /** @returns whether this run stands still now, paused if necessary */
+  async #still(): Promise<boolean> {
     const { epoch, status } = this.#store;
     if (status?.run === 'running' && !await this.#order('pause')) {
       return false;
@@ -241,11 +243,7 @@ class Outcome {
     return this.#store.epoch === epoch;
   }
 
-  /**
-   * @param {Card} facts
-   * @returns {Node[]}
-   */
-  #card(facts) {
+  #card(facts: Card): Node[] {
     const { against, phase, why } = facts;
     const title = element('h2', { text: why.title });
     return [
@@ -279,12 +277,7 @@ class Outcome {
     ].filter((item) => item !== null);
   }
 
-  /**
-   * @param {string} text
-   * @param {Awaiting|Ready} facts
-   * @returns {Node[]}
-   */
-  #bar(text, facts) {
+  #bar(text: string, facts: Awaiting | Ready): Node[] {
     const drive = facts.phase === 'driver' && facts.holder === null
       ? this.#button('drive', `Drive ${facts.seat}`, () => this.#drive(facts.seat),
         `Take the seat of ${facts.seat}`, 'drive-button primary', facts.refused) : null;
@@ -302,20 +295,14 @@ class Outcome {
     }, 'Show the result of the run', 'drive-button');
   }
 
-  /**
-   * @param {string} action
-   * @param {string} text
-   * @param {() => void} act
-   * @param {string} title
-   * @param {string} kind
-   * @param {string} [refused] why it cannot be pressed
-   */
-  #button(action, text, act, title, kind, refused = '') {
+  /** @param refused why it cannot be pressed */
+  #button(action: string, text: string, act: () => void, title: string, kind: string,
+    refused = '') {
     return element('button', { type: 'button', class: kind, 'data-action': action,
       title: refused || title, disabled: refused !== '',
       'aria-label': text || title, on: { click: (event) => {
         // A focused button would be pressed by the space bar, which brakes.
-        /** @type {HTMLElement} */ (event.currentTarget).blur();
+        (event.currentTarget as HTMLElement).blur();
         act();
       } } }, action === 'close' ? icon('close') : document.createTextNode(text));
   }
@@ -337,29 +324,23 @@ class Outcome {
   }
 
   #another() {
-    /** @type {HTMLElement|null} */
-    const tab = document.querySelector('#tab-scenario');
+    const tab: HTMLElement | null = document.querySelector('#tab-scenario');
     tab?.click();
   }
 
-  /** @param {string} seat */
-  #drive(seat) {
+  #drive(seat: string) {
     const { driving } = window.crgame;
     if (driving !== undefined) {
       this.#ask(driving.claim(seat));
     }
   }
 
-  /** @param {RunAction} action */
-  #order(action) {
+  #order(action: RunAction) {
     return this.#ask(this.#connection.request({ type: 'control', action }));
   }
 
-  /**
-   * @param {Promise<Reply>} reply
-   * @returns {Promise<boolean>} whether it was done
-   */
-  async #ask(reply) {
+  /** @returns whether it was done */
+  async #ask(reply: Promise<Reply>): Promise<boolean> {
     const { ok, text } = await reply;
     if (!ok) {
       this.#store.receive({ type: 'notice', level: 'warn', text });
@@ -368,8 +349,7 @@ class Outcome {
   }
 }
 
-/** @param {Awaiting} facts */
-function driverText({ seat, run, holder, holderName, me }) {
+function driverText({ seat, run, holder, holderName, me }: Awaiting) {
   if (holder === null) {
     return run === 'waiting' ? `The run begins as soon as a driver takes ${seat}.`
       : `${seat} waits for its driver.`;
@@ -381,11 +361,8 @@ function driverText({ seat, run, holder, holderName, me }) {
 /**
  * Make the card.
  *
- * @param {HTMLElement} root #outcome
- * @param {Store} store
- * @param {Connection} connection
- * @returns {Outcome}
+ * @param root #outcome
  */
-export function createOutcome(root, store, connection) {
+export function createOutcome(root: HTMLElement, store: Store, connection: Connection): Outcome {
   return new Outcome(root, store, connection);
 }

@@ -6,37 +6,32 @@ import { fileAddress, replayAddress, zipAddress } from '../after/run_api.js';
 import { element } from '../dom.js';
 import { clockTime, NONE, oneLine, plural } from './format.js';
 
-/** @import { Scored } from '../after/score.js' */
-/** @import { Contact, Files, Recording, Status } from '../messages.js' */
+import type { Scored } from '../after/score.js';
+import type { Contact, Files, Recording, Status } from '../messages.js';
 
 // Further entries of a kind are only counted.
 const MOST_LISTED = 5;
 const REPORT = 'report.html';
 
-/**
- * The result of a run.
- *
- * @typedef {object} Result
- * @property {{title: string, text: string}} why
- * @property {boolean} stays
- * @property {number} t [s]
- * @property {boolean} driven
- * @property {(Contact & {part: string})[]} contacts
- * @property {{vehicle: string, t: number}[]} departures
- * @property {{id: string, name: string, accepted: number, refused: number, fallbacks: number}[]
- *   } planners
- * @property {[name: string, text: string, explanation: string][]} figures
- * @property {Recording} recording
- * @property {Files|null} files
- * @property {Scored} scored
- * @property {string|null} mine the vehicle that this page drives
- */
+/** The result of a run. */
+export interface Result {
+  why: { title: string; text: string };
+  stays: boolean;
+  t: number; // [s]
+  driven: boolean;
+  contacts: (Contact & { part: string })[];
+  departures: { vehicle: string; t: number }[];
+  planners: { id: string; name: string; accepted: number; refused: number; fallbacks: number }[];
+  figures: [name: string, text: string, explanation: string][];
+  recording: Recording;
+  files: Files | null;
+  scored: Scored;
+  mine: string | null; // the vehicle that this page drives
+}
 
-/** @param {Status} status */
-export function why({ reason, t, contacts = [] }) {
+export function why({ reason, t, contacts = [] }: Status) {
   const after = clockTime(t);
-  /** @param {string} text */
-  const over = (text) => ({ title: 'The run is over', text });
+  const over = (text: string) => ({ title: 'The run is over', text });
   const [kind, , vehicle] = (reason ?? '').split(' ');
   switch (kind) {
     case 'duration': return over(`Its duration of ${after} is over.`);
@@ -55,8 +50,7 @@ export function why({ reason, t, contacts = [] }) {
   }
 }
 
-/** @param {Result} facts */
-export function table(facts) {
+export function table(facts: Result) {
   const rows = facts.driven ? [
     ['Contacts', listed(facts.contacts, (item) => `${item.vehicle} with ${item.with}`,
       (item) => item.part)],
@@ -72,13 +66,8 @@ export function table(facts) {
       element('td', { text })))));
 }
 
-/**
- * Return the side of the contact and who could have avoided it, if the timing report says so.
- *
- * @param {Contact} contact
- * @param {Files|null} files
- */
-export function part(contact, files) {
+/** Return the side of the contact and who could have avoided it, if the timing report says so. */
+export function part(contact: Contact, files: Files | null) {
   const pair = [contact.vehicle, contact.with].sort().join();
   const named = files?.contacts?.find((item) => [item.vehicle, item.with].sort().join() === pair);
   return named === undefined ? ''
@@ -86,13 +75,9 @@ export function part(contact, files) {
       + `${oneLine(named.avoidable_by)})`;
 }
 
-/**
- * @template {{t: number}} Item
- * @param {Item[]} items
- * @param {(item: Item) => string} name
- * @param {(item: Item) => string} remark = () => ''
- */
-function listed(items, name, remark = () => '') {
+/** @param remark = () => '' */
+function listed<Item extends { t: number }>(items: Item[], name: (item: Item) => string,
+  remark: (item: Item) => string = () => '') {
   if (items.length === 0) {
     return 'none';
   }
@@ -102,20 +87,15 @@ function listed(items, name, remark = () => '') {
   return [...texts, ...(more > 0 ? [`${more} more`] : [])].join('; ');
 }
 
-/** @param {Result['figures']} items */
-export function figures(items) {
+export function figures(items: Result['figures']) {
   return [element('details', {}, element('summary', { text: 'How it kept time (table I)' }),
     element('dl', { class: 'outcome-figures' }, ...items.map(
       ([name, text, explanation]) => element('div', { title: explanation },
         element('dt', { text: name }), element('dd', { text: text || NONE })))))];
 }
 
-/**
- * Return the list of files to view and download.
- *
- * @param {Result & {connected: boolean}} facts
- */
-export function fileList({ files, recording, connected }) {
+/** Return the list of files to view and download. */
+export function fileList({ files, recording, connected }: Result & { connected: boolean }) {
   if (recording?.state === 'failed') {
     return element('p', { class: 'field-error', text: oneLine(recording.text) });
   }
@@ -136,12 +116,8 @@ export function fileList({ files, recording, connected }) {
       text: 'Scenario, timing report and report are being written …' }));
 }
 
-/**
- * @param {string} text
- * @param {string} href
- * @param {boolean} download instead of showing it in another tab
- */
-function link(text, href, download) {
+/** @param download instead of showing it in another tab */
+function link(text: string, href: string, download: boolean) {
   return element('li', {}, element('a', { href, text, download, target: download ? null : '_blank',
     rel: 'noopener' }));
 }

@@ -5,7 +5,7 @@
 import { element, setText } from '../dom.js';
 import { errorText, oneLine } from './format.js';
 
-/** @import { PlannerOption } from '../messages.js' */
+import type { PlannerOption } from '../api_messages.js';
 
 /** Fields for the options, which are asked for when they are opened. */
 export class PlannerOptions {
@@ -15,21 +15,19 @@ export class PlannerOptions {
   #ask;
   #fields = element('div', { class: 'stack' });
   #hint = element('p', { class: 'hint' });
-  /**
-   * Of the chosen planner; null until they are known.
-   *
-   * @type {Map<string, HTMLInputElement>|null}
-   */
-  #inputs = null;
+  /** Of the chosen planner; null until they are known. */
+  #inputs: Map<string, HTMLInputElement> | null = null;
   /** The planner that was asked about last. */
   #asked = '';
+  root;
 
   /**
-   * @param {HTMLSelectElement} select the choice of the planner
-   * @param {Record<string, string>} own the game's options for its own planner, as typed
-   * @param {(planner: string) => Promise<PlannerOption[]>} ask for the options of a planner
+   * @param select the choice of the planner
+   * @param own the game's options for its own planner, as typed
+   * @param ask for the options of a planner
    */
-  constructor(select, own, ask) {
+  constructor(select: HTMLSelectElement, own: Record<string, string>,
+    ask: (planner: string) => Promise<PlannerOption[]>) {
     this.#select = select;
     this.#own = own;
     this.#present = select.value;
@@ -74,11 +72,7 @@ export class PlannerOptions {
     }
   }
 
-  /**
-   * @param {PlannerOption[]} options
-   * @param {Record<string, string>} present
-   */
-  #show(options, present) {
+  #show(options: PlannerOption[], present: Record<string, string>) {
     this.#inputs = new Map(options.map(({ name, default: usual }) => [name, element('input', {
       type: 'text', autocomplete: 'off', placeholder: usual || 'required',
       value: Object.hasOwn(present, name) ? present[name] : '' })]));

@@ -9,17 +9,14 @@ import { baseName } from './event_words.js';
 import { count, fixed, oneLine } from './format.js';
 import { icon } from './icons.js';
 
-/** @import { Connection } from '../connection.js' */
-/** @import { PlannerStatus } from '../messages.js' */
-/** @import { Store } from '../store.js' */
+import type { Connection } from '../connection.js';
+import type { PlannerStatus } from '../messages.js';
+import type { Store } from '../store.js';
 
-/** @typedef {Partial<PlannerStatus>} Planner the known part of it */
+export type Planner = Partial<PlannerStatus>; // the known part of it
 
-/**
- * @type {[name: string, explanation: string, text: (planner: Planner) => string,
- *   unit: string][]}
- */
-const COLUMNS = [
+const COLUMNS: [name: string, explanation: string, text: (planner: Planner) => string,
+  unit: string][] = [
   ['Latency', 'from the request to the plan', (p) => fixed(p.latency_ms, 0), 'ms'],
   ['Age', 'of the plan that is being followed', (p) => fixed(p.age_ms, 0), 'ms'],
   ['Accepted', 'plans taken', (p) => count(p.accepted), ''],
@@ -30,8 +27,7 @@ const COLUMNS = [
 const TRACKING_TITLE = "Deviation from the middle of its route's lane, and from the position that "
   + 'its plan of a second ago gave for now; in parentheses the worst of the run';
 // Of a tracked AV: name of the error, factor to the unit, unit, digits.
-/** @type {[name: string, factor: number, unit: string, digits: number][]} */
-const ERRORS = [
+const ERRORS: [name: string, factor: number, unit: string, digits: number][] = [
   ['lane', 1, 'm', 2], ['lateral', 1, 'm', 2], ['along', 1, 'm', 2],
   ['heading', 180 / Math.PI, '°', 1], ['speed', 1, 'm/s', 2],
 ];
@@ -39,11 +35,9 @@ const ERRORS = [
 /**
  * Make the table.
  *
- * @param {HTMLElement} root #panel-timing
- * @param {Store} store
- * @param {Connection} connection
+ * @param root #panel-timing
  */
-export function createPlanners(root, store, connection) {
+export function createPlanners(root: HTMLElement, store: Store, connection: Connection) {
   const empty = element('p', { class: 'hint', text: 'No autonomous vehicle takes part.' });
   const table = element('table', { class: 'planners' },
     element('caption', { class: 'unseen', text: 'Planners' }),
@@ -52,8 +46,7 @@ export function createPlanners(root, store, connection) {
         scope: 'col', title: explanation, text: name,
       }, unit ? element('span', { class: 'unit', text: unit }) : null)))));
   root.append(element('h2', { text: 'Planners' }), empty, table);
-  /** @type {Map<string, ReturnType<typeof makeRow>>} */
-  const rows = new Map();
+  const rows = new Map<string, ReturnType<typeof makeRow>>();
 
   const update = () => {
     if (root.closest('[hidden]')) {
@@ -85,11 +78,7 @@ export function createPlanners(root, store, connection) {
   rebuild();
 }
 
-/**
- * @param {string} av
- * @param {Connection} connection
- */
-function makeRow(av, connection) {
+function makeRow(av: string, connection: Connection) {
   const name = element('span', { class: 'dim planner-name' });
   const state = element('span', { class: 'tag' });
   const error = element('p', { class: 'field-error', role: 'alert' });
@@ -117,11 +106,7 @@ function makeRow(av, connection) {
         element('div', {}, element('strong', { class: 'av', text: av }), name, state, button),
         refusal, seen, tracking, error)),
       element('tr', {}, element('td', {}), ...cells)),
-    /**
-     * @param {Planner} planner
-     * @param {Store} store
-     */
-    update(planner, store) {
+    update(planner: Planner, store: Store) {
       const stopped = planner.running === false;
       wanted.run = stopped;
       setText(name, baseName(planner.planner || store.scene?.planners?.[av]));
@@ -155,12 +140,8 @@ function makeRow(av, connection) {
   };
 }
 
-/**
- * Return how far a tracked AV is from its lane and its plan: now, and at worst so far.
- *
- * @param {PlannerStatus['tracking']|undefined} tracking
- */
-function trackingText(tracking) {
+/** Return how far a tracked AV is from its lane and its plan: now, and at worst so far. */
+function trackingText(tracking: PlannerStatus['tracking'] | undefined) {
   if (!tracking) {
     return '';
   }

@@ -4,63 +4,72 @@
 
 import { thin, unwrap } from './series.js';
 
-/** @import { Limits } from '../criticality.js' */
-/** @import { VEHICLE } from '../frames.js' */
-/** @import { History } from '../history.js' */
-/** @import { Exposure, SceneVehicle } from '../messages.js' */
-/** @import { ChartView } from './chart.js' */
-/** @import { HealthLog } from './series.js' */
+import type { Limits } from '../criticality.js';
+import type { VEHICLE } from '../frames.js';
+import type { History } from '../history.js';
+import type { Exposure, SceneVehicle } from '../messages.js';
+import type { ChartView } from './chart.js';
+import type { HealthLog } from './series.js';
 
 const DEGREES = 180 / Math.PI;
 const DASHES = ['solid', 'dot', 'dash'];
 
-/**
- * A line: a column of vehicles' states, a figure of the run's health, the latency of planners,
- * the criticality of vehicles now or over the run so far, or a limit.
- *
- * @typedef {object} ColumnLine
- * @property {keyof typeof VEHICLE} column
- * @property {string} [name]
- * @property {number} [factor] to the unit
- * @property {boolean} [angle] whether whole turns are removed
- * @typedef {{name: string, health: 'lag'|'step_error'}} HealthLine
- * @typedef {{latency: true, name?: string}} LatencyLine
- * @typedef {{critical: string, name?: string}} CriticalLine
- * @typedef {{exposures: string, name?: string}} ExposureLines measures over a run, of a unit
- * @typedef {{limit: string, name: string}} LimitLine
- * @typedef {ColumnLine|HealthLine|LatencyLine|CriticalLine|ExposureLines|LimitLine} Line
- */
+// A line: a column of vehicles' states, a figure of the run's health, the latency of planners,
+// the criticality of vehicles now or over the run so far, or a limit.
+export interface ColumnLine {
+  column: keyof typeof VEHICLE;
+  name?: string;
+  factor?: number; // to the unit
+  angle?: boolean; // whether whole turns are removed
+}
 
-/**
- * @typedef {object} Quantity
- * @property {string} key
- * @property {string} title
- * @property {string} unit
- * @property {number} digits of the newest value
- * @property {[number, number]} [range] of the axis
- * @property {Line[]} lines
- */
+export interface HealthLine { name: string; health: 'lag' | 'step_error' }
+export interface LatencyLine { latency: true; name?: string }
+export interface CriticalLine { critical: string; name?: string }
+/** Measures over a run, of a unit. */
+export interface ExposureLines { exposures: string; name?: string }
+export interface LimitLine { limit: string; name: string }
+export type Line = ColumnLine | HealthLine | LatencyLine | CriticalLine | ExposureLines
+  | LimitLine;
 
-/**
- * @typedef {{id: string, role: SceneVehicle['role'], color: string, past: History,
- *   critical: (name: string) => {t: number[], values: number[]}}} PlottedVehicle
- * @typedef {{vehicles: PlottedVehicle[], health: HealthLog, runColor: string,
- *   limitColor: string, limits: Limits, exposures: Exposure[]}} PlotData
- * @typedef {Pick<ChartView, 'from'|'to'|'shown'>} PlotWindow
- */
+export interface Quantity {
+  key: string;
+  title: string;
+  unit: string;
+  digits: number; // of the newest value
+  range?: [number, number]; // of the axis
+  lines: Line[];
+}
 
-/**
- * @typedef {object} Trace
- * @property {string} name
- * @property {string} color
- * @property {string} dash
- * @property {number[]} x [s]
- * @property {(number|null)[]} y
- * @property {number} now the newest value
- */
+export interface PlottedVehicle {
+  id: string;
+  role: SceneVehicle['role'];
+  color: string;
+  past: History;
+  critical: (name: string) => { t: number[]; values: number[] };
+}
 
-/** @type {Quantity[]} */
-export const QUANTITIES = [
+export interface PlotData {
+  vehicles: PlottedVehicle[];
+  health: HealthLog;
+  runColor: string;
+  limitColor: string;
+  limits: Limits;
+  exposures: Exposure[];
+}
+
+export type PlotWindow = Pick<ChartView, 'from' | 'to' | 'shown'>;
+
+export interface Trace {
+  name: string;
+  color: string;
+  dash: string;
+  x: number[]; // [s]
+  y: (number | null)[];
+  now: number; // the newest value
+}
+
+export const QUANTITIES: Quantity[] = [
   { key: 'speed', title: 'Speed', unit: 'm/s', digits: 2, lines: [{ column: 'speed' }] },
   {
     key: 'acceleration', title: 'Acceleration', unit: 'm/s²', digits: 2,
@@ -89,12 +98,9 @@ export const QUANTITIES = [
 /**
  * Make the lines of a quantity.
  *
- * @param {Quantity} quantity
- * @param {PlotData} data of the vehicles that are selected
- * @param {PlotWindow} view
- * @returns {Trace[]}
+ * @param data of the vehicles that are selected
  */
-export function traces(quantity, data, view) {
+export function traces(quantity: Quantity, data: PlotData, view: PlotWindow): Trace[] {
   return quantity.lines.flatMap((line, i) => {
     if ('health' in line) {
       return [trace(line.name, data.runColor, DASHES[i], data.health.t,
@@ -121,13 +127,8 @@ export function traces(quantity, data, view) {
   });
 }
 
-/**
- * @param {PlottedVehicle} vehicle
- * @param {ColumnLine|LatencyLine|CriticalLine} line
- * @param {HealthLog} health
- * @returns {{t: number[], values: number[]}}
- */
-function series(vehicle, line, health) {
+function series(vehicle: PlottedVehicle, line: ColumnLine | LatencyLine | CriticalLine,
+  health: HealthLog): { t: number[]; values: number[] } {
   if ('critical' in line) {
     return vehicle.critical(line.critical);
   }
@@ -135,25 +136,13 @@ function series(vehicle, line, health) {
     : { t: vehicle.past.t, values: column(vehicle.past, line) };
 }
 
-/**
- * @param {History} past
- * @param {ColumnLine} line
- */
-function column(past, { column: name, factor = 1, angle = false }) {
+function column(past: History, { column: name, factor = 1, angle = false }: ColumnLine) {
   const values = angle ? unwrap(past[name]) : past[name];
   return factor === 1 ? values : values.map((value) => value * factor);
 }
 
-/**
- * @param {string} name
- * @param {string} color
- * @param {string} dash
- * @param {number[]} t
- * @param {number[]} values
- * @param {PlotWindow} view
- * @returns {Trace}
- */
-function trace(name, color, dash, t, values, view) {
+function trace(name: string, color: string, dash: string, t: number[], values: number[],
+  view: PlotWindow): Trace {
   let newest = t.length - 1;
   while (newest > 0 && t[newest] > view.shown) {
     newest -= 1;

@@ -7,30 +7,24 @@ import { errorText } from './format.js';
 import { part, why } from './outcome_card.js';
 import { TABLE_I, valueOf } from './timing.js';
 
-/** @import { Scored } from '../after/score.js' */
-/** @import { Files, Scene, Status } from '../messages.js' */
-/** @import { Result } from './outcome_card.js' */
-/** @import { Store } from '../store.js' */
+import type { Scored } from '../after/score.js';
+import type { Files, Scene, Status } from '../messages.js';
+import type { Result } from './outcome_card.js';
+import type { Store } from '../store.js';
 
 // Names of figures of table I for a run that is over.
-/** @type {Record<string, string>} */
-const FINAL_NAMES = { final_error_ms: 'Lag at the end' };
+const FINAL_NAMES: Record<string, string> = { final_error_ms: 'Lag at the end' };
 
 /** The result; one per page. */
 export class RunResult {
   #store;
   #changed;
-  /** @type {Files|null} */
-  #files = null;
+  #files: Files | null = null;
   // The requested scores, by run.
-  /** @type {Map<string, Scored>} */
-  #scores = new Map();
+  #scores = new Map<string, Scored>();
 
-  /**
-   * @param {Store} store
-   * @param {() => void} changed called when files or a score have come
-   */
-  constructor(store, changed) {
+  /** @param changed called when files or a score have come */
+  constructor(store: Store, changed: () => void) {
     this.#store = store;
     this.#changed = changed;
     store.on('files', (files) => {
@@ -44,14 +38,8 @@ export class RunResult {
     this.#files = null;
   }
 
-  /**
-   * Return the result.
-   *
-   * @param {Status} status
-   * @param {Scene} scene
-   * @returns {Result}
-   */
-  of(status, scene) {
+  /** Return the result. */
+  of(status: Status, scene: Scene): Result {
     const over = status.run === 'ended';
     const files = over && this.#files?.epoch === status.epoch ? this.#files : null;
     const { timing } = status;
@@ -74,14 +62,8 @@ export class RunResult {
     };
   }
 
-  /**
-   * Return the score of the run, once its recording is closed and the server has sent it.
-   *
-   * @param {Status} status
-   * @param {Files|null} files
-   * @returns {Scored}
-   */
-  #score({ recording }, files) {
+  /** Return the score of the run, once its recording is closed and the server has sent it. */
+  #score({ recording }: Status, files: Files | null): Scored {
     if (files === null || recording.state === 'recording') {
       return recording.state === 'none' ? { state: 'none', why: 'nothing was recorded' }
         : { state: 'waiting' };

@@ -9,25 +9,20 @@ import { picturesOf, rasterised } from './chart_picture.js';
 import { errorText } from './format.js';
 import { csvOf, fileName, rowsOf, save } from './saved_file.js';
 
-/** @import { HistoryPanel } from './history.js' */
-/** @import { Store } from '../store.js' */
+import type { HistoryPanel } from './history.js';
+import type { Store } from '../store.js';
 
 const DOWN = 'M12 4v11M7 10l5 5 5-5M4 17v3h16v-3';
 
 /**
  * Put the buttons into the panels and on the map.
  *
- * @param {HTMLElement} root #panels
- * @param {Store} store
- * @returns {{savePlots: (panel: string, format: string) => Promise<void>}}
+ * @param root #panels
  */
-export function createSaving(root, store) {
-  /**
-   * @param {string} name
-   * @param {string} format
-   */
-  const savePlots = async (name, format) => {
-    const panel = /** @type {HistoryPanel|undefined} */ (window.crgame[name]);
+export function createSaving(root: HTMLElement,
+  store: Store): { savePlots: (panel: string, format: string) => Promise<void> } {
+  const savePlots = async (name: string, format: string) => {
+    const panel = window.crgame[name] as HistoryPanel | undefined;
     if (panel === undefined) {
       return;
     }
@@ -57,19 +52,12 @@ export function createSaving(root, store) {
   return { savePlots };
 }
 
-/**
- * @param {'plots'|'tables'} what
- * @returns {string[]} their names
- */
-function panelsThatSave(what) {
+/** @returns their names */
+function panelsThatSave(what: 'plots' | 'tables'): string[] {
   return PANELS.filter(({ saves }) => saves?.includes(what)).map(({ name }) => name);
 }
 
-/**
- * @param {HistoryPanel} panel
- * @param {string} format
- */
-async function plots(panel, format) {
+async function plots(panel: HistoryPanel, format: string) {
   if (format === 'csv') {
     return new Blob([csvOf([['quantity', 'unit', 'line', 'time_s', 'value'], ...panel.rows])],
       { type: 'text/csv' });
@@ -78,11 +66,7 @@ async function plots(panel, format) {
   return format === 'svg' ? new Blob([svg.text], { type: 'image/svg+xml' }) : rasterised(svg);
 }
 
-/**
- * @param {HTMLElement} panel
- * @param {string} name
- */
-function saveTables(panel, name) {
+function saveTables(panel: HTMLElement, name: string) {
   const rows = [...panel.querySelectorAll('table')].flatMap((table, i) => [
     ...(i > 0 ? [['']] : []),
     [table.closest('section')?.querySelector('h3')?.textContent
@@ -91,12 +75,8 @@ function saveTables(panel, name) {
   save(fileName(name, 'csv'), new Blob([csvOf(rows)], { type: 'text/csv' }));
 }
 
-/**
- * In its own group, because other groups are hidden if they do not apply.
- *
- * @param {Store} store
- */
-function addViewButton(store) {
+/** In its own group, because other groups are hidden if they do not apply. */
+function addViewButton(store: Store) {
   const group = element('div', { class: 'world-group view-save' });
   document.querySelector('.world-toolbar')?.append(group);
   toolButton(group, DOWN, 'Save the map or the 3D view as PNG', async () => {
@@ -110,9 +90,8 @@ function addViewButton(store) {
   }).dataset.action = 'save-view';
 }
 
-/** @returns {Promise<Blob|null>} */
-function pictureOfMap() {
+function pictureOfMap(): Promise<Blob | null> {
   return new Promise((resolve) => {
-    /** @type {HTMLCanvasElement|null} */ (document.querySelector('#world'))?.toBlob(resolve);
+    (document.querySelector('#world') as HTMLCanvasElement | null)?.toBlob(resolve);
   });
 }

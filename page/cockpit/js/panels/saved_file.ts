@@ -8,18 +8,12 @@ import { element } from '../dom.js';
 const FORMULA = /^[=+\-@\t]/;
 const NUMBER = /^[+-]?[\d.]+(e[+-]?\d+)?$/i;
 
-/**
- * Write a table as CSV (RFC 4180).
- *
- * @param {(string|number)[][]} rows
- * @returns {string}
- */
-export function csvOf(rows) {
+/** Write a table as CSV (RFC 4180). */
+export function csvOf(rows: (string | number)[][]): string {
   return rows.map((row) => row.map(cell).join(',')).join('\r\n') + '\r\n';
 }
 
-/** @param {string|number} value */
-function cell(value) {
+function cell(value: string | number) {
   const text = String(value).replaceAll('−', '-').replaceAll('\u202f', '');
   const safe = FORMULA.test(text) && !NUMBER.test(text) ? `'${text}` : text;
   return /[",\r\n]/.test(safe) ? `"${safe.replaceAll('"', '""')}"` : safe;
@@ -28,21 +22,15 @@ function cell(value) {
 /**
  * Read the rows of a table on the page.
  *
- * @param {HTMLElement} table or a list of terms
- * @returns {string[][]}
+ * @param table or a list of terms
  */
-export function rowsOf(table) {
+export function rowsOf(table: HTMLElement): string[][] {
   return [...table.querySelectorAll('tr')].map((row) => (
     [...row.querySelectorAll('th, td')].map((node) => (node.textContent ?? '').trim())));
 }
 
-/**
- * Save a file through the browser.
- *
- * @param {string} name
- * @param {Blob} content
- */
-export function save(name, content) {
+/** Save a file through the browser. */
+export function save(name: string, content: Blob) {
   const href = URL.createObjectURL(content);
   const link = element('a', { href, download: name });
   link.click();
@@ -50,13 +38,8 @@ export function save(name, content) {
   setTimeout(() => URL.revokeObjectURL(href), 10000);
 }
 
-/**
- * Return a file name from the run and the time.
- *
- * @param {string} what
- * @param {string} ending
- */
-export function fileName(what, ending) {
+/** Return a file name from the run and the time. */
+export function fileName(what: string, ending: string) {
   const { scene, status } = window.crgame.store;
   const run = (scene?.benchmark_id ?? 'crgame').replace(/[^\w-]+/g, '_');
   return `${run}_${what}_${(status?.t ?? 0).toFixed(1)}s.${ending}`;

@@ -14,9 +14,9 @@ import { ScenarioForm } from './scenario_form.js';
 import { ScenarioList } from './scenario_list.js';
 import { ScenarioPreview } from './scenario_preview.js';
 
-/** @import { Connection } from '../connection.js' */
-/** @import { Entry, Offer, Preview } from '../messages.js' */
-/** @import { Store } from '../store.js' */
+import type { Connection } from '../connection.js';
+import type { Entry, Offer, Preview } from '../api_messages.js';
+import type { Store } from '../store.js';
 
 // A larger file is not sent, because the server would refuse it [bytes].
 const LARGEST_FILE = 64 * 1024 * 1024;
@@ -27,13 +27,11 @@ const BEGINS_WITHIN_MS = 60000;
 class ScenarioPanel {
   #store;
   #connection;
-  /** @type {Offer} */
-  #offered = { folders: [], planners: [], drivers: [] };
+  #offered: Offer = { folders: [], planners: [], drivers: [] };
   #chosen = '';
   // The entry that was started last here.
   #begun = '';
-  /** @type {AbortController|null} */
-  #abort = null;
+  #abort: AbortController | null = null;
   #list = new ScenarioList((entry) => this.choose(entry.id),
     (entry) => this.#delete(entry));
   #form = new ScenarioForm();
@@ -56,12 +54,7 @@ class ScenarioPanel {
   #card;
   #dropZone;
 
-  /**
-   * @param {HTMLElement} root
-   * @param {Store} store
-   * @param {Connection} connection
-   */
-  constructor(root, store, connection) {
+  constructor(root: HTMLElement, store: Store, connection: Connection) {
     this.#store = store;
     this.#connection = connection;
     const file = element('input', {
@@ -89,8 +82,7 @@ class ScenarioPanel {
       if (store.mode !== 'live' || !store.rights.directs) {
         return;
       }
-      /** @type {HTMLElement|null} */
-      const tab = document.querySelector('#tab-scenario');
+      const tab: HTMLElement | null = document.querySelector('#tab-scenario');
       tab?.click();
       this.upload(files);
     });
@@ -107,12 +99,8 @@ class ScenarioPanel {
     this.#list.show(this.#offered.folders, this.#chosen);
   }
 
-  /**
-   * Preview an entry, so that it can be started.
-   *
-   * @param {string} id
-   */
-  async choose(id) {
+  /** Preview an entry, so that it can be started. */
+  async choose(id: string) {
     this.#abort?.abort();
     const abort = new AbortController();
     this.#abort = abort;
@@ -134,12 +122,8 @@ class ScenarioPanel {
     this.#busy.end();
   }
 
-  /**
-   * Upload a chosen or dropped file.
-   *
-   * @param {File[]} files
-   */
-  async upload(files) {
+  /** Upload a chosen or dropped file. */
+  async upload(files: File[]) {
     this.#clearErrors();
     const [file] = files;
     const wrong = wrongFiles(files);
@@ -182,8 +166,8 @@ class ScenarioPanel {
     this.#start.disabled = false;
   }
 
-  /** @param {Entry} entry an upload */
-  async #delete(entry) {
+  /** @param entry an upload */
+  async #delete(entry: Entry) {
     this.#clearErrors();
     if (!await confirm(`Delete the upload ${oneLine(entry.title)}?`,
       'It can be uploaded again. Recordings of it keep the map.', 'Delete')) {
@@ -233,11 +217,9 @@ class ScenarioPanel {
   /** Resolves when a run of a new epoch is no longer waiting for its planners. */
   #nextRun() {
     const before = this.#store.scene?.time?.epoch ?? this.#store.epoch;
-    /** @type {(() => void)[]} */
-    const ends = [];
+    const ends: (() => void)[] = [];
     const cancel = () => ends.splice(0).forEach((end) => end());
-    /** @type {Promise<void>} */
-    const promise = new Promise((resolve, reject) => {
+    const promise = new Promise<void>((resolve, reject) => {
       const timer = setTimeout(() => {
         cancel();
         reject(new Error('The run has not begun within a minute; the timing panel and the '
@@ -262,8 +244,7 @@ class ScenarioPanel {
     return { promise, cancel };
   }
 
-  /** @param {Preview} preview */
-  #show(preview) {
+  #show(preview: Preview) {
     this.#card.hidden = false;
     const { scene } = preview;
     setText(this.#name, oneLine(scene.title || scene.benchmark_id));
@@ -287,12 +268,8 @@ class ScenarioPanel {
   }
 }
 
-/**
- * Return whether several drivers have to report that they are ready.
- *
- * @param {Store} store
- */
-function waitsForSeveral(store) {
+/** Return whether several drivers have to report that they are ready. */
+function waitsForSeveral(store: Store) {
   return Object.values(store.seats).filter(({ driver }) => driver === 'cockpit').length > 1;
 }
 
@@ -300,8 +277,7 @@ function fieldError() {
   return element('p', { class: 'field-error', role: 'alert' });
 }
 
-/** @param {File[]} files */
-function wrongFiles(files) {
+function wrongFiles(files: File[]) {
   if (files.length !== 1) {
     return files.length === 0 ? 'That is no file.' : 'Drop one file at a time.';
   }
@@ -315,12 +291,10 @@ function wrongFiles(files) {
 /**
  * Create the panel, which fetches its list when it is first shown.
  *
- * @param {HTMLElement} root #panel-scenario
- * @param {Store} store
- * @param {Connection} connection
- * @returns {ScenarioPanel}
+ * @param root #panel-scenario
  */
-export function createScenario(root, store, connection) {
+export function createScenario(root: HTMLElement, store: Store,
+  connection: Connection): ScenarioPanel {
   const replay = element('p', {
     class: 'hint', hidden: true,
   });

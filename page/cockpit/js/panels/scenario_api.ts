@@ -4,7 +4,8 @@
 
 import { oneLine } from './format.js';
 
-/** @import { Choice, Offer, PlannerOption, Preview } from '../messages.js' */
+import type { Choice, Offer, PlannerOption, Preview } from '../api_messages.js';
+import type { Reply } from '../messages.js';
 
 /** Header of all requests that change something: a page of another site cannot add it. */
 export const OWN = { 'X-Crgame': '1' };
@@ -14,45 +15,42 @@ function own() {
   return { ...OWN, ...window.crgame?.person?.headers };
 }
 
-/** @returns {Promise<Offer>} */
-export function fetchScenarios() {
+export function fetchScenarios(): Promise<Offer> {
   return ask('/api/scenarios');
 }
 
 /**
- * @param {string} id of an entry
- * @param {AbortSignal} signal aborts it
- * @returns {Promise<Preview>}
+ * @param id of an entry
+ * @param signal aborts it
  */
-export function fetchPreview(id, signal) {
+export function fetchPreview(id: string, signal: AbortSignal): Promise<Preview> {
   return ask(`/api/preview?id=${encodeURIComponent(id)}`, { signal });
 }
 
-/**
- * @param {string} planner one of those that can be chosen
- * @returns {Promise<PlannerOption[]>}
- */
-export async function fetchPlannerOptions(planner) {
-  return (await ask(`/api/planner?name=${encodeURIComponent(planner)}`)).options;
+/** @param planner one of those that can be chosen */
+export async function fetchPlannerOptions(planner: string): Promise<PlannerOption[]> {
+  const { options } = await ask<{ options: PlannerOption[] }>(
+    `/api/planner?name=${encodeURIComponent(planner)}`);
+  return options;
 }
 
 /**
- * @param {File} file a CommonRoad file
- * @returns {Promise<string>} id of its entry
+ * @param file a CommonRoad file
+ * @returns id of its entry
  */
-export async function upload(file) {
-  const reply = await ask(`/api/upload?name=${encodeURIComponent(file.name)}`, {
+export async function upload(file: File): Promise<string> {
+  const reply = await ask<{ id: string }>(`/api/upload?name=${encodeURIComponent(file.name)}`, {
     method: 'POST', body: file, headers: { ...own(), 'Content-Type': 'application/xml' },
   });
   return reply.id;
 }
 
 /**
- * @param {string} id of an upload
- * @returns {Promise<string>} what was done
+ * @param id of an upload
+ * @returns what was done
  */
-export async function deleteUpload(id) {
-  const reply = await ask('/api/upload/delete', {
+export async function deleteUpload(id: string): Promise<string> {
+  const reply = await ask<Reply>('/api/upload/delete', {
     method: 'POST', body: JSON.stringify({ id }),
     headers: { ...OWN, 'Content-Type': 'application/json' },
   });
@@ -60,11 +58,11 @@ export async function deleteUpload(id) {
 }
 
 /**
- * @param {Choice} choice id, humans [{id, driver}], avs [{id, planner, options}]
- * @returns {Promise<string>} what was done
+ * @param choice id, humans [{id, driver}], avs [{id, planner, options}]
+ * @returns what was done
  */
-export async function load(choice) {
-  const reply = await ask('/api/load', {
+export async function load(choice: Choice): Promise<string> {
+  const reply = await ask<Reply>('/api/load', {
     method: 'POST', body: JSON.stringify(choice),
     headers: { ...own(), 'Content-Type': 'application/json' },
   });
@@ -74,12 +72,10 @@ export async function load(choice) {
 /**
  * Ask the server for JSON.
  *
- * @param {string} path
- * @param {RequestInit} [options]
- * @returns {Promise<any>} the server's answer, of the type of this path
+ * @returns the server's answer, of the type of this path
  * @throws {Error} with one readable line
  */
-export async function ask(path, options = {}) {
+export async function ask<Content>(path: string, options: RequestInit = {}): Promise<Content> {
   let response;
   try {
     response = await fetch(path, { credentials: 'same-origin', ...options });

@@ -7,41 +7,36 @@ import { baseName } from './event_words.js';
 import { PlannerOptions } from './planner_options.js';
 import { fetchPlannerOptions } from './scenario_api.js';
 
-/** @import { Preview } from '../messages.js' */
+import type { Preview } from '../api_messages.js';
 
-/** @type {Record<string, string>} */
-const DRIVERS = {
+const DRIVERS: Record<string, string> = {
   auto: "this machine's wheel, gamepad or keyboard", idle: 'no driver', cockpit: 'a cockpit page',
   evdev: 'a wheel or gamepad at this machine', joy: 'messages on the joy topic',
 };
 
 /** One choice for each human-driven and each autonomous vehicle. */
 export class ScenarioForm {
-  /** @type {Map<string, {select: HTMLSelectElement, error: HTMLElement}>} */
-  #rows = new Map();
-  /** @type {Map<string, PlannerOptions>} */
-  #options = new Map();
-  /** @type {string[]} */
-  #humans = [];
-  /** @type {string[]} */
-  #avs = [];
+  #rows = new Map<string, { select: HTMLSelectElement; error: HTMLElement }>();
+  #options = new Map<string, PlannerOptions>();
+  #humans: string[] = [];
+  #avs: string[] = [];
+  root;
 
   constructor() {
     this.root = element('div', { class: 'who' });
   }
 
   /**
-   * @param {Preview} preview answer of /api/preview
-   * @param {string[]} drivers that can be chosen
-   * @param {string[]} planners that can be chosen
+   * @param preview answer of /api/preview
+   * @param drivers that can be chosen
+   * @param planners that can be chosen
    */
-  show(preview, drivers, planners) {
+  show(preview: Preview, drivers: string[], planners: string[]) {
     this.#rows.clear();
     this.#options.clear();
     this.#humans = preview.humans.map((human) => human.id);
     this.#avs = preview.avs.map((av) => av.id);
-    /** @type {HTMLElement[]} */
-    const nodes = [];
+    const nodes: HTMLElement[] = [];
     for (const { id, driver } of preview.humans) {
       nodes.push(this.#row(id, 'human', 'driven by', driver, drivers, driverWords));
     }
@@ -50,7 +45,7 @@ export class ScenarioForm {
       if (problem !== null && problem !== undefined) {
         row.title = `planning problem ${problem}`;
       }
-      const select = /** @type {HTMLSelectElement} */ (this.#rows.get(id)?.select);
+      const select = this.#rows.get(id)?.select as HTMLSelectElement;
       const more = new PlannerOptions(select, options ?? {}, fetchPlannerOptions);
       this.#options.set(id, more);
       row.append(more.root);
@@ -68,8 +63,7 @@ export class ScenarioForm {
 
   /** Return the choices: humans [{id, driver}], avs [{id, planner, options}]. */
   get choices() {
-    /** @param {string} id */
-    const value = (id) => this.#rows.get(id)?.select.value ?? '';
+    const value = (id: string) => this.#rows.get(id)?.select.value ?? '';
     return {
       humans: this.#humans.map((id) => ({ id, driver: value(id) })),
       avs: this.#avs.map((id) => {
@@ -82,10 +76,10 @@ export class ScenarioForm {
   /**
    * Show an error beside the vehicle that it names.
    *
-   * @param {string} text the error; empty removes all
-   * @returns {boolean} false if it names no vehicle here
+   * @param text the error; empty removes all
+   * @returns false if it names no vehicle here
    */
-  blame(text) {
+  blame(text: string): boolean {
     let found = false;
     for (const [id, { select, error }] of this.#rows) {
       const named = text.split(/\W+/).includes(id)
@@ -97,15 +91,8 @@ export class ScenarioForm {
     return found;
   }
 
-  /**
-   * @param {string} id
-   * @param {string} role
-   * @param {string} label
-   * @param {string} present
-   * @param {string[]} known
-   * @param {(value: string) => string} words
-   */
-  #row(id, role, label, present, known, words) {
+  #row(id: string, role: string, label: string, present: string, known: string[],
+    words: (value: string) => string) {
     const all = [...new Set([present, ...known].filter(Boolean))];
     const select = element('select', { 'aria-label': `${id} is ${label}` },
       ...all.map((value) => element('option', {
@@ -119,8 +106,7 @@ export class ScenarioForm {
   }
 }
 
-/** @param {string} driver */
-function driverWords(driver) {
+function driverWords(driver: string) {
   const words = Object.hasOwn(DRIVERS, driver) ? ` – ${DRIVERS[driver]}` : '';
   return baseName(driver) + words;
 }

@@ -6,19 +6,14 @@ import { element } from '../dom.js';
 import { oneLine } from './format.js';
 import { icon } from './icons.js';
 
-/** @import { Entry, Offer } from '../messages.js' */
+import type { Entry, Offer } from '../api_messages.js';
 
 const KINDS = { game: 'game', scenario: 'CommonRoad', upload: 'uploaded' };
 
-/** @param {Entry} entry */
-const isGame = (entry) => entry.kind === 'game';
+const isGame = (entry: Entry) => entry.kind === 'game';
 
-/**
- * Sort games before bare scenarios, because games are made to be driven.
- *
- * @param {Entry[]} entries
- */
-function gamesFirst(entries) {
+/** Sort games before bare scenarios, because games are made to be driven. */
+function gamesFirst(entries: Entry[]) {
   return [...entries.filter(isGame), ...entries.filter((entry) => !isGame(entry))];
 }
 
@@ -29,15 +24,15 @@ export class ScenarioList {
   #list = element('div', { class: 'scenario-list', role: 'radiogroup', 'aria-label': 'Scenario' });
   #nothing = element('p', { class: 'hint', hidden: true });
   #filter;
-  /** @type {Map<string, {entry: Entry, button: HTMLButtonElement, item: HTMLElement,
-   *   words: string}>} */
-  #entries = new Map();
+  #entries = new Map<string, {
+    entry: Entry; button: HTMLButtonElement; item: HTMLElement; words: string }>();
+  root;
 
   /**
-   * @param {(entry: Entry) => void} chosen called with the chosen entry
-   * @param {(entry: Entry) => void} unwanted called with the upload to delete
+   * @param chosen called with the chosen entry
+   * @param unwanted called with the upload to delete
    */
-  constructor(chosen, unwanted) {
+  constructor(chosen: (entry: Entry) => void, unwanted: (entry: Entry) => void) {
     this.#chosen = chosen;
     this.#unwanted = unwanted;
     this.#filter = element('input', {
@@ -49,10 +44,10 @@ export class ScenarioList {
   }
 
   /**
-   * @param {Offer['folders']} folders of /api/scenarios
-   * @param {string} chosen id of the entry that is marked, empty for none
+   * @param folders of /api/scenarios
+   * @param chosen id of the entry that is marked, empty for none
    */
-  show(folders, chosen) {
+  show(folders: Offer['folders'], chosen: string) {
     this.#entries.clear();
     this.#list.replaceChildren(...folders.filter((folder) => folder.entries.length > 0).map(
       (folder) => element('div', { class: 'scenario-folder' },
@@ -62,19 +57,16 @@ export class ScenarioList {
     this.#sift();
   }
 
-  /** @param {string} id of the entry to mark as chosen */
-  mark(id) {
+  /** @param id of the entry to mark as chosen */
+  mark(id: string) {
     for (const [other, { button }] of this.#entries) {
       button.setAttribute('aria-checked', String(other === id));
     }
     this.#entries.get(id)?.button.scrollIntoView({ block: 'nearest' });
   }
 
-  /**
-   * @param {string} id
-   * @returns {Entry|undefined} the entry with it
-   */
-  entry(id) {
+  /** @returns the entry with it */
+  entry(id: string): Entry | undefined {
     return this.#entries.get(id)?.entry;
   }
 
@@ -83,8 +75,7 @@ export class ScenarioList {
     return [...this.#entries.values()].map(({ entry }) => entry).filter(isGame);
   }
 
-  /** @param {Entry} entry */
-  #item(entry) {
+  #item(entry: Entry) {
     const title = oneLine(entry.title || entry.name);
     const button = element('button', {
       type: 'button', role: 'radio', class: 'scenario', 'data-id': entry.id,
@@ -109,7 +100,7 @@ export class ScenarioList {
       item.hidden = !wanted.every((word) => words.includes(word));
       found += item.hidden ? 0 : 1;
     }
-    for (const folder of /** @type {Iterable<HTMLElement>} */ (this.#list.children)) {
+    for (const folder of this.#list.children as Iterable<HTMLElement>) {
       folder.hidden = !folder.querySelector(':scope > :is(button, div):not([hidden])');
     }
     this.#nothing.hidden = found > 0;

@@ -5,8 +5,9 @@
 import { outlineOf } from '../outline.js';
 import { onThemeChange, themeColor } from '../world/palette.js';
 
-/** @import { Box, Preview, Scene, SceneObject, Shape } from '../messages.js' */
-/** @import { ColorName } from '../world/palette.js' */
+import type { Preview } from '../api_messages.js';
+import type { Box, Scene, SceneObject, Shape } from '../messages.js';
+import type { ColorName } from '../world/palette.js';
 
 const MARGIN_PX = 8;
 // Least drawn size, so that vehicles are visible on a long road [px].
@@ -21,33 +22,31 @@ const AROUND_M = 30;
 const OVERVIEW = 0.25;
 const VULNERABLE = new Set(['pedestrian', 'bicycle', 'motorcycle']);
 
-/** @typedef {{x: number, y: number, width: number, height: number}} Area of the canvas [px] */
+export interface Area { x: number; y: number; width: number; height: number } // of the canvas [px]
 
-/**
- * @typedef {object} Body
- * @property {Shape} shape
- * @property {number[]} pose x, y [m], yaw [rad]
- * @property {number} ahead from there to the centre [m]
- * @property {string} fill
- * @property {number} scale [px/m]
- * @property {string|null} [edge]
- */
+export interface Body {
+  shape: Shape;
+  pose: number[]; // x, y [m], yaw [rad]
+  ahead: number; // from there to the centre [m]
+  fill: string;
+  scale: number; // [px/m]
+  edge?: string | null;
+}
 
 /** A drawing on a canvas, for any size and theme. */
 export class ScenarioPreview {
   #canvas;
-  /** @type {Preview|null} */
-  #preview = null;
+  #preview: Preview | null = null;
 
-  /** @param {HTMLCanvasElement} canvas its size is that of its box */
-  constructor(canvas) {
+  /** @param canvas its size is that of its box */
+  constructor(canvas: HTMLCanvasElement) {
     this.#canvas = canvas;
     new ResizeObserver(() => this.#draw()).observe(canvas);
     onThemeChange(() => this.#draw());
   }
 
-  /** @param {Preview|null} preview answer of /api/preview */
-  show(preview) {
+  /** @param preview answer of /api/preview */
+  show(preview: Preview | null) {
     this.#preview = preview;
     this.#draw();
   }
@@ -63,7 +62,7 @@ export class ScenarioPreview {
     if (this.#preview === null) {
       return;
     }
-    const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
+    const context = canvas.getContext('2d') as CanvasRenderingContext2D;
     const whole = this.#preview.scene.bounds;
     const all = { x: 0, y: 0, width: canvas.width, height: canvas.height };
     if (scaleOf(all, whole) * CAR_M >= CAR_PX * window.devicePixelRatio) {
@@ -81,13 +80,8 @@ export class ScenarioPreview {
   }
 }
 
-/**
- * @param {CanvasRenderingContext2D} context
- * @param {Preview} preview
- * @param {Area} area
- * @param {Box} bounds
- */
-function drawScene(context, { scene, states }, area, bounds) {
+function drawScene(context: CanvasRenderingContext2D, { scene, states }: Preview, area: Area,
+  bounds: Box) {
   context.save();
   context.beginPath();
   context.rect(area.x, area.y, area.width, area.height);
@@ -106,14 +100,8 @@ function drawScene(context, { scene, states }, area, bounds) {
   context.restore();
 }
 
-/**
- * A box around all driven vehicles, of the shape of its area.
- *
- * @param {Preview} preview
- * @param {Area} area
- * @returns {Box}
- */
-function surroundings({ scene, states }, area) {
+/** A box around all driven vehicles, of the shape of its area. */
+function surroundings({ scene, states }: Preview, area: Area): Box {
   const poses = scene.vehicles.map((_, i) => pose(states.vehicles, i));
   if (poses.length === 0) {
     return scene.bounds;
@@ -129,15 +117,8 @@ function surroundings({ scene, states }, area) {
   return [x - half, y - tall, x + half, y + tall];
 }
 
-/**
- * A line between the two drawings, and in the overview a frame around what the other shows.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {Area} overview
- * @param {Box} whole
- * @param {Box} around
- */
-function drawMarks(context, overview, whole, around) {
+/** A line between the two drawings, and in the overview a frame around what the other shows. */
+function drawMarks(context: CanvasRenderingContext2D, overview: Area, whole: Box, around: Box) {
   context.save();
   context.strokeStyle = themeColor('border');
   context.lineWidth = window.devicePixelRatio;
@@ -152,30 +133,21 @@ function drawMarks(context, overview, whole, around) {
 }
 
 /**
- * @param {(number|null)[][]} rows of vehicles or objects
- * @param {number} index of one of them
- * @returns {number[]} x, y [m], yaw [rad]; NaN if there is none
+ * @param rows of vehicles or objects
+ * @param index of one of them
+ * @returns x, y [m], yaw [rad]; NaN if there is none
  */
-function pose(rows, index) {
+function pose(rows: (number | null)[][], index: number): number[] {
   return (rows[index] ?? []).slice(0, 3).map((value) => value ?? NaN);
 }
 
-/**
- * @param {Area} area
- * @param {Box} bounds
- */
-function scaleOf(area, [left, bottom, right, top]) {
+function scaleOf(area: Area, [left, bottom, right, top]: Box) {
   const margin = MARGIN_PX * window.devicePixelRatio;
   return Math.min((area.width - 2 * margin) / Math.max(right - left, 1),
     (area.height - 2 * margin) / Math.max(top - bottom, 1));
 }
 
-/**
- * @param {CanvasRenderingContext2D} context
- * @param {Area} area
- * @param {Box} bounds
- */
-function fit(context, area, bounds) {
+function fit(context: CanvasRenderingContext2D, area: Area, bounds: Box) {
   const [left, bottom, right, top] = bounds;
   const scale = scaleOf(area, bounds);
   context.setTransform(scale, 0, 0, -scale,
@@ -184,12 +156,7 @@ function fit(context, area, bounds) {
   return scale;
 }
 
-/**
- * @param {CanvasRenderingContext2D} context
- * @param {number[]} flat
- * @param {boolean} [close]
- */
-function trace(context, flat, close = false) {
+function trace(context: CanvasRenderingContext2D, flat: number[], close = false) {
   for (let i = 0; i + 1 < flat.length; i += 2) {
     if (i === 0) {
       context.moveTo(flat[i], flat[i + 1]);
@@ -202,12 +169,7 @@ function trace(context, flat, close = false) {
   }
 }
 
-/**
- * @param {CanvasRenderingContext2D} context
- * @param {Scene} scene
- * @param {number} scale
- */
-function drawRoads(context, scene, scale) {
+function drawRoads(context: CanvasRenderingContext2D, scene: Scene, scale: number) {
   const pixel = window.devicePixelRatio / scale;
   context.lineWidth = pixel;
   context.fillStyle = themeColor('map-road');
@@ -235,11 +197,7 @@ function drawRoads(context, scene, scale) {
   context.globalAlpha = 1;
 }
 
-/**
- * @param {SceneObject} object
- * @returns {ColorName}
- */
-function objectColour(object) {
+function objectColour(object: SceneObject): ColorName {
   if (VULNERABLE.has(object.type)) {
     return 'vulnerable';
   }
@@ -247,11 +205,8 @@ function objectColour(object) {
   return role === 'static' || role === 'traffic' || role === 'scripted' ? role : 'recorded';
 }
 
-/**
- * @param {CanvasRenderingContext2D} context
- * @param {Body} body
- */
-function drawBody(context, { shape, pose: [x, y, yaw], ahead, fill, scale, edge = null }) {
+function drawBody(context: CanvasRenderingContext2D,
+  { shape, pose: [x, y, yaw], ahead, fill, scale, edge = null }: Body) {
   if (!Number.isFinite(x + y + yaw)) {
     return;
   }

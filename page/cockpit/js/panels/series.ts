@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Series of measurements for plots: few points that keep the peaks. */
 
-/** @import { Status } from '../messages.js' */
+import type { Status } from '../messages.js';
 
 /** Most points that are drawn of a series. */
 export const MOST_POINTS = 400;
@@ -12,17 +12,16 @@ export const MOST_POINTS = 400;
  * Intervals begin at multiples of their length, so that the plot does not flicker while the
  * window moves.
  *
- * @param {number[]} t increasing [s]
- * @param {number[]} values as many; NaN makes a gap
- * @param {number} from first time wanted [s]
- * @param {number} to last time wanted [s]
- * @returns {{x: number[], y: Array<number|null>}} at most MOST_POINTS points
+ * @param t increasing [s]
+ * @param values as many; NaN makes a gap
+ * @param from first time wanted [s]
+ * @param to last time wanted [s]
+ * @returns at most MOST_POINTS points
  */
-export function thin(t, values, from, to) {
-  /** @type {number[]} */
-  const x = [];
-  /** @type {(number|null)[]} */
-  const y = [];
+export function thin(t: number[], values: number[], from: number,
+  to: number): { x: number[]; y: Array<number | null> } {
+  const x: number[] = [];
+  const y: (number | null)[] = [];
   const first = t.findIndex((time) => time >= from);
   let end = t.length;
   while (end > 0 && t[end - 1] > to) {
@@ -66,10 +65,10 @@ export function thin(t, values, from, to) {
 /**
  * Remove the jumps of a whole turn from a series of angles.
  *
- * @param {number[]} angles [rad]
- * @returns {number[]} [rad], starting between -pi and pi
+ * @param angles [rad]
+ * @returns [rad], starting between -pi and pi
  */
-export function unwrap(angles) {
+export function unwrap(angles: number[]): number[] {
   const turn = 2 * Math.PI;
   let offset = 0;
   return angles.map((angle, i) => {
@@ -80,28 +79,26 @@ export function unwrap(angles) {
   });
 }
 
-/**
- * @typedef {{t: number, latency: Record<string, number>, step_error: number, lag: number,
- *   exposures: Record<string, Record<string, number|null>>}} Row
- */
+export interface Row {
+  t: number;
+  latency: Record<string, number>;
+  step_error: number;
+  lag: number;
+  exposures: Record<string, Record<string, number | null>>;
+}
 
-/**
- * @param {Status['timing']} timing
- * @param {string} key
- */
-function figure(timing, key) {
+function figure(timing: Status['timing'], key: string) {
   const value = timing?.[key];
   return typeof value === 'number' ? value : NaN;
 }
 
 /** Figures of the run that come with its status, over the last two minutes. */
 export class HealthLog {
-  /** @type {Row[]} */
-  #rows = [];
+  #rows: Row[] = [];
   #keeps_s;
 
-  /** @param {number} keeps_s how far back [s] */
-  constructor(keeps_s) {
+  /** @param keeps_s how far back [s] */
+  constructor(keeps_s: number) {
     this.#keeps_s = keeps_s;
   }
 
@@ -110,8 +107,8 @@ export class HealthLog {
     this.#rows = [];
   }
 
-  /** @param {Status} status as the server sends it */
-  add(status) {
+  /** @param status as the server sends it */
+  add(status: Status) {
     const { t } = status;
     if (!Number.isFinite(t)) {
       return;
@@ -123,13 +120,11 @@ export class HealthLog {
     while (this.#rows.length > 0 && this.#rows[0].t < t - this.#keeps_s) {
       this.#rows.shift();
     }
-    /** @type {Record<string, number>} */
-    const latency = {};
+    const latency: Record<string, number> = {};
     for (const [av, planner] of Object.entries(status.planners ?? {})) {
       latency[av] = planner.latency_ms ?? NaN;
     }
-    /** @type {Row['exposures']} */
-    const exposures = {};
+    const exposures: Row['exposures'] = {};
     for (const [vehicle, told] of Object.entries(status.criticality ?? {})) {
       exposures[vehicle] = told.exposures;
     }
@@ -145,27 +140,20 @@ export class HealthLog {
   }
 
   /**
-   * @param {'step_error'|'lag'} name 'step_error' or 'lag'
-   * @returns {number[]} [ms]
+   * @param name 'step_error' or 'lag'
+   * @returns [ms]
    */
-  column(name) {
+  column(name: 'step_error' | 'lag'): number[] {
     return this.#rows.map((row) => row[name]);
   }
 
-  /**
-   * @param {string} av
-   * @returns {number[]} its plan latency [ms]
-   */
-  latency(av) {
+  /** @returns its plan latency [ms] */
+  latency(av: string): number[] {
     return this.#rows.map((row) => row.latency[av] ?? NaN);
   }
 
-  /**
-   * @param {string} vehicle
-   * @param {string} name
-   * @returns {number[]} what a measure over the run had grown to
-   */
-  exposure(vehicle, name) {
+  /** @returns what a measure over the run had grown to */
+  exposure(vehicle: string, name: string): number[] {
     return this.#rows.map((row) => row.exposures[vehicle]?.[name] ?? NaN);
   }
 }

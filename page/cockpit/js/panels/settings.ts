@@ -15,16 +15,15 @@ const THEMES = [
  * Create the button that cycles through the themes. Parts that draw with the colours are notified
  * by `onThemeChange` of the world's palette.
  *
- * @param {HTMLElement} root of the button
- * @returns {{theme: string, setTheme: (theme: string) => void}} theme: 'dark', 'light' or '' for
- *   the system's
+ * @param root of the button
+ * @returns theme: 'dark', 'light' or '' for the system's
  */
-export function createSettings(root) {
+export function createSettings(
+  root: HTMLElement): { theme: string; setTheme: (theme: string) => void } {
   const button = element('button', { type: 'button', id: 'theme', class: 'icon-button' });
   const settings = {
     theme: '',
-    /** @param {string} theme */
-    setTheme(theme) {
+    setTheme(theme: string) {
       const [name, picture, label] = THEMES.find(([known]) => known === theme) ?? THEMES[0];
       settings.theme = name;
       if (name) {
@@ -48,12 +47,8 @@ export function createSettings(root) {
   return settings;
 }
 
-/**
- * Add the full-screen button, if the browser supports it.
- *
- * @param {HTMLElement} root
- */
-function addFullscreen(root) {
+/** Add the full-screen button, if the browser supports it. */
+function addFullscreen(root: HTMLElement) {
   if (!document.fullscreenEnabled) {
     return;
   }

@@ -13,9 +13,9 @@ const WIDEST_SHARE = 0.6;
 /**
  * Add the panels, which are empty and hidden.
  *
- * @param {HTMLElement} root aside#panels
+ * @param root aside#panels
  */
-export function addPanels(root) {
+export function addPanels(root: HTMLElement) {
   root.append(...PANELS.map(({ name }) => element('section', {
     id: `panel-${name}`, class: 'panel', role: 'tabpanel', hidden: true })));
 }
@@ -23,17 +23,15 @@ export function addPanels(root) {
 /**
  * Make the tabs.
  *
- * @param {HTMLElement} root aside#panels
- * @returns {{show: (name: string) => void, current: string}} show opens a panel by its name
+ * @param root aside#panels
+ * @returns show opens a panel by its name
  */
-export function createTabs(root) {
-  /** @type {Map<string, HTMLElement>} */
-  const tabs = new Map();
+export function createTabs(root: HTMLElement): { show: (name: string) => void; current: string } {
+  const tabs = new Map<string, HTMLElement>();
   const list = part(root, 'tabs');
   const panels = {
     current: '',
-    /** @param {string} name */
-    show(name) {
+    show(name: string) {
       panels.current = name;
       for (const [other, tab] of tabs) {
         tab.setAttribute('aria-selected', String(other === name));
@@ -64,8 +62,7 @@ export function createTabs(root) {
   return panels;
 }
 
-/** @param {HTMLElement} root */
-function addCollapse(root) {
+function addCollapse(root: HTMLElement) {
   const button = element('button', {
     type: 'button', id: 'collapse', class: 'icon-button', 'aria-controls': 'panels',
     'aria-label': 'Panels', title: 'Show or hide the panels',
@@ -75,21 +72,15 @@ function addCollapse(root) {
   collapse(root, recall('collapsed') === 'yes');
 }
 
-/**
- * @param {HTMLElement} root
- * @param {boolean} away
- */
-function collapse(root, away) {
+function collapse(root: HTMLElement, away: boolean) {
   root.hidden = away;
   document.querySelector('#collapse')?.setAttribute('aria-expanded', String(!away));
   remember('collapsed', away ? 'yes' : 'no');
 }
 
-/** @param {HTMLElement} root */
-function addHandle(root) {
+function addHandle(root: HTMLElement) {
   const rem = () => parseFloat(getComputedStyle(document.documentElement).fontSize);
-  /** @param {number} width_rem */
-  const setWidth = (width_rem) => {
+  const setWidth = (width_rem: number) => {
     const most = WIDEST_SHARE * window.innerWidth / rem();
     const width = Math.max(NARROWEST_REM, Math.min(width_rem, most));
     document.documentElement.style.setProperty('--panel-width', `${width.toFixed(1)}rem`);
@@ -123,16 +114,13 @@ function addHandle(root) {
 /**
  * Return the keys to the car after a click: the space bar brakes, and would press a focused
  * button; arrows would change a choice. Keyboard users keep the focus.
- *
- * @param {Document} scope
  */
-function releaseFocus(scope) {
+function releaseFocus(scope: Document) {
   let byPointer = false;
-  /** @param {EventTarget|null} target */
-  const blur = (target) => {
-    /** @type {HTMLElement|null} */
-    const focused = target instanceof Element ? target.closest('button, select, input') : null;
-    focused?.blur();
+  const blur = (target: EventTarget | null) => {
+    if (target instanceof Element) {
+      target.closest<HTMLElement>('button, select, input')?.blur();
+    }
   };
   scope.addEventListener('pointerdown', () => { byPointer = true; }, true);
   scope.addEventListener('keydown', (event) => {

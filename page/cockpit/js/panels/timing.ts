@@ -5,29 +5,23 @@
 import { element, setAttribute, setText } from '../dom.js';
 import { count, fixed, oneLine, plural } from './format.js';
 
-/** @import { Status, Timing } from '../messages.js' */
-/** @import { Store } from '../store.js' */
+import type { Status, Timing } from '../messages.js';
+import type { Store } from '../store.js';
 
 // Lag in steps from which timesync_node calls a run late.
 const LATE_STEPS = 10;
 
-/** @typedef {(value: number) => string} Format */
-/** @type {(digits: number) => Format} */
-const ms = (digits) => (value) => `${fixed(value, digits)} ms`;
-/** @type {(digits: number) => Format} */
-const percent = (digits) => (value) => `${fixed(100 * value, digits)} %`;
-/** @type {Format} */
-const ratio = (value) => fixed(value, 3);
+export type Format = (value: number) => string;
+const ms = (digits: number): Format => (value) => `${fixed(value, digits)} ms`;
+const percent = (digits: number): Format => (value) => `${fixed(100 * value, digits)} %`;
+const ratio: Format = (value) => fixed(value, 3);
 
-/**
- * @typedef {[key: string, name: string, explanation: string]} Named
- * @typedef {[...Named, format: Format, isLate?: (value: number, step_ms: number) => boolean]
- *   } Figure
- * @typedef {Map<string, {show: (text: string, late: boolean) => void}>} Rows
- */
+export type Named = [key: string, name: string, explanation: string];
+export type Figure = [...Named, format: Format,
+  isLate?: (value: number, step_ms: number) => boolean];
+export type Rows = Map<string, { show: (text: string, late: boolean) => void }>;
 
-/** @type {Figure[]} */
-export const TABLE_I = [
+export const TABLE_I: Figure[] = [
   ['final_error_ms', 'Lag now', 'E_f: simulated behind wall-clock time, resets added back',
     ms(2), (value, step) => value > LATE_STEPS * step],
   ['mean_step_error_ms', 'Mean step error', 'mean of |e_n| over all steps', ms(3),
@@ -47,8 +41,7 @@ export const TABLE_I = [
     (value) => (Number.isFinite(value) ? value.toExponential(1).replace('-', '−') : '–')],
 ];
 
-/** @type {Figure[]} */
-const MORE = [
+const MORE: Figure[] = [
   ['rate_hz', 'Rate', 'steps per second', (value) => `${fixed(value, 1)} Hz`],
   ['worst_lag_ms', 'Worst lag', 'behind the schedule in force when a cycle began', ms(1),
     (value, step) => value > LATE_STEPS * step],
@@ -71,15 +64,12 @@ const MORE = [
 /**
  * Make the figures.
  *
- * @param {HTMLElement} root #panel-timing
- * @param {Store} store
+ * @param root #panel-timing
  */
-export function createTiming(root, store) {
+export function createTiming(root: HTMLElement, store: Store) {
   const hint = element('p', { class: 'hint', text: 'Measured from the second step on.' });
-  /** @type {Rows} */
-  const run = new Map();
-  /** @type {Rows} */
-  const rows = new Map();
+  const run: Rows = new Map();
+  const rows: Rows = new Map();
   const worst = element('p', { class: 'hint', 'data-key': 'worst_late_step' });
   const tables = element('div', {},
     element('h2', { text: 'Timekeeping' }), table(TABLE_I, rows, 'Table I'),
@@ -115,22 +105,19 @@ export function createTiming(root, store) {
 }
 
 /**
- * @param {Timing} timing figures by key, live or from `timing.json`
- * @param {string} key of the figure
- * @returns {number} NaN if there is none
+ * @param timing figures by key, live or from `timing.json`
+ * @param key of the figure
+ * @returns NaN if there is none
  */
-export function valueOf(timing, key) {
+export function valueOf(timing: Timing, key: string): number {
   const nested = key.match(/^(real_time_ratio)_(\w+)$/);
   const group = nested && !(key in timing) ? timing[nested[1]] : undefined;
   const value = nested && group && typeof group === 'object' ? group[nested[2]] : timing[key];
   return typeof value === 'number' ? value : NaN;
 }
 
-/**
- * @param {Timing} timing
- * @returns {string} the worst late step and its causes, in words
- */
-export function worstLateStep(timing) {
+/** @returns the worst late step and its causes, in words */
+export function worstLateStep(timing: Timing): string {
   const told = timing.worst_late_step;
   if (typeof told !== 'string') {
     return 'This recording does not tell why steps were late: an earlier version made it.';
@@ -138,12 +125,7 @@ export function worstLateStep(timing) {
   return told === '' ? 'No step was late.' : `Worst late step: ${oneLine(told)}.`;
 }
 
-/**
- * @param {Rows} run
- * @param {Status} status
- * @param {Store} store
- */
-function showRun(run, status, store) {
+function showRun(run: Rows, status: Status, store: Store) {
   const asked = status.real_time_factor;
   const measured = status.measured_factor;
   const slow = status.run === 'running' && measured !== null && measured < 0.95 * asked;
@@ -155,12 +137,7 @@ function showRun(run, status, store) {
   run.get('delay')?.show(`${fixed(store.round_trip_ms, 0)} ms`, store.round_trip_ms > 200);
 }
 
-/**
- * @param {[...Named, ...unknown[]][]} entries
- * @param {Rows} rows
- * @param {string} caption
- */
-function table(entries, rows, caption) {
+function table(entries: [...Named, ...unknown[]][], rows: Rows, caption: string) {
   return element('table', { class: 'figures' },
     element('caption', { class: 'unseen', text: caption }),
     element('tbody', {}, ...entries.map(([key, name, explanation]) => {

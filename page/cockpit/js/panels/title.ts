@@ -5,17 +5,16 @@
 import { setText } from '../dom.js';
 import { isolated } from './format.js';
 
-/** @import { Store } from '../store.js' */
+import type { Store } from '../store.js';
 
 const PROGRAM = 'crgame';
 
 /**
  * Keep the title up to date.
  *
- * @param {HTMLElement} root #title
- * @param {Store} store
+ * @param root #title
  */
-export function createTitle(root, store) {
+export function createTitle(root: HTMLElement, store: Store) {
   const update = () => {
     const title = isolated(store.scene?.title || PROGRAM);
     setText(root, title);

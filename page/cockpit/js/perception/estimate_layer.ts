@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The estimated pose of an AV: an outline, and the ellipse of two standard deviations. */
 
-/** @import { ShownEstimate } from '../perceived.js' */
-/** @import { LiveView } from '../world/painter.js' */
-/** @import { DrawnVehicle } from '../world/vehicle_layer.js' */
+import type { ShownEstimate } from '../perceived.js';
+import type { LiveView } from '../world/painter.js';
+import type { DrawnVehicle } from '../world/vehicle_layer.js';
 
 const SIGMAS = 2;
 const LINE_PX = 1.8;
@@ -12,30 +12,24 @@ const DASH_PX = [6, 3];
 const FILL_ALPHA = 0.25;
 const CROSS_PX = 4;
 
-/**
- * Half axes [m], direction of the major one in the map [rad].
- *
- * @typedef {{major: number, minor: number, angle: number}} Ellipse
- */
+/** Half axes [m], direction of the major one in the map [rad]. */
+export interface Ellipse { major: number; minor: number; angle: number }
 
 /** The layer that draws the estimate of one AV. */
 export class EstimateLayer {
-  /**
-   * The estimate drawn last, null for none.
-   *
-   * @type {(ShownEstimate & Partial<Ellipse>)|null}
-   */
-  drawn = null;
+  /** The estimate drawn last, null for none. */
+  drawn: (ShownEstimate & Partial<Ellipse>) | null = null;
 
   /**
    * Draw the estimate.
    *
-   * @param {CanvasRenderingContext2D} context of the world
-   * @param {LiveView} view as layers get it
-   * @param {DrawnVehicle|undefined} vehicle of the vehicle layer, that of the AV
-   * @param {number} av its index; -1 draws nothing
+   * @param context of the world
+   * @param view as layers get it
+   * @param vehicle of the vehicle layer, that of the AV
+   * @param av its index; -1 draws nothing
    */
-  draw(context, { camera, palette, ratio, store, shown }, vehicle, av) {
+  draw(context: CanvasRenderingContext2D, { camera, palette, ratio, store, shown }: LiveView,
+    vehicle: DrawnVehicle | undefined, av: number) {
     const estimate = av < 0 ? null : store.perceived.estimateOf(av, shown.t);
     this.drawn = estimate;
     if (estimate === null || vehicle === undefined) {
@@ -72,10 +66,9 @@ export class EstimateLayer {
 /**
  * Return the ellipse of two standard deviations of a covariance.
  *
- * @param {{xx: number, xy: number, yy: number}} covariance [m^2]
- * @returns {Ellipse}
+ * @param covariance [m^2]
  */
-export function ellipse({ xx, xy, yy }) {
+export function ellipse({ xx, xy, yy }: { xx: number; xy: number; yy: number }): Ellipse {
   const mean = (xx + yy) / 2;
   const spread = Math.hypot((xx - yy) / 2, xy);
   return {

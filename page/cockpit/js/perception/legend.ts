@@ -5,8 +5,7 @@
 import { element, setAttribute, setText, svg } from '../dom.js';
 
 // name: [strokes in a box of 28 x 16, words]; $ is the AV. The styles are in world.css.
-/** @type {Record<string, [strokes: string, words: string]>} */
-const ENTRIES = {
+const ENTRIES: Record<string, [strokes: string, words: string]> = {
   unseen: ['M14 2a6 6 0 1 0 .01 0z', 'not seen by $'],
   rays: ['M2 14L26 2V14z', 'what the sensors of $ reach'],
   estimate: ['M3 4h22v8H3z', 'estimated pose of $, 2σ'],
@@ -19,11 +18,10 @@ const UNKNOWN = 'what $ sees is not known now';
 /** A small table over the map. */
 export class Legend {
   #root;
-  /** @type {Map<string, {row: HTMLElement, text: HTMLElement}>} */
-  #rows = new Map();
+  #rows = new Map<string, { row: HTMLElement; text: HTMLElement }>();
 
-  /** @param {HTMLElement} stage that holds the canvas */
-  constructor(stage) {
+  /** @param stage that holds the canvas */
+  constructor(stage: HTMLElement) {
     this.#root = element('ul', { class: 'world-legend', 'aria-label': 'Legend', hidden: true });
     for (const [name, [strokes]] of Object.entries(ENTRIES)) {
       const text = element('span', {});
@@ -39,11 +37,11 @@ export class Legend {
   /**
    * Show the entries of the layers on the map.
    *
-   * @param {string[]} names of the layers
-   * @param {string} av id of the AV that is followed
-   * @param {boolean} known whether it is known what it sees
+   * @param names of the layers
+   * @param av id of the AV that is followed
+   * @param known whether it is known what it sees
    */
-  show(names, av, known) {
+  show(names: string[], av: string, known: boolean) {
     for (const [name, { row, text }] of this.#rows) {
       const words = name === 'unseen' && !known ? UNKNOWN : ENTRIES[name][1];
       setText(text, words.replace('$', av));

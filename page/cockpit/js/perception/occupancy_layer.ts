@@ -2,39 +2,37 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The layer of permanent obstacles: occupied cells, drawn so that thin walls stay visible. */
 
-/** @import { OccupancyFrame } from '../frames.js' */
-/** @import { View } from '../world/painter.js' */
+import type { OccupancyFrame } from '../frames.js';
+import type { View } from '../world/painter.js';
 
 // Cells smaller than this on the screen are merged by fours, repeatedly [px].
 const LEAST_PX = 0.75;
 const COARSEST = 6;
 
-/**
- * @typedef {object} Level of detail
- * @property {number} coarseness its cells are 2 to the power of this as long as the map's
- * @property {number} rows
- * @property {number} columns
- * @property {Uint8Array} cells
- * @property {HTMLCanvasElement|null} picture
- */
+/** Of detail. */
+export interface Level {
+  coarseness: number; // its cells are 2 to the power of this as long as the map's
+  rows: number;
+  columns: number;
+  cells: Uint8Array;
+  picture: HTMLCanvasElement | null;
+}
 
 /** The layer that draws the store's map as a picture in the theme's colour. */
 export class OccupancyLayer {
   /** Number of occupied cells in the map that was drawn last. */
   drawn = 0;
-  /** @type {OccupancyFrame|null} */
-  #map = null;
+  #map: OccupancyFrame | null = null;
   #color = '';
-  /** @type {Level[]} */
-  #levels = [];
+  #levels: Level[] = [];
 
   /**
    * Draw the map.
    *
-   * @param {CanvasRenderingContext2D} context of the world
-   * @param {View} view as layers get it
+   * @param context of the world
+   * @param view as layers get it
    */
-  draw(context, { camera, palette, ratio, store }) {
+  draw(context: CanvasRenderingContext2D, { camera, palette, ratio, store }: View) {
     const map = store.perceived.occupancy;
     if (map === null) {
       this.drawn = 0;
@@ -61,13 +59,8 @@ export class OccupancyLayer {
     context.drawImage(level.picture, 0, 0, level.columns * edge, level.rows * edge);
   }
 
-  /**
-   * Return the finest level whose cells are large enough on the screen.
-   *
-   * @param {number} cell_px
-   * @returns {Level}
-   */
-  #level(cell_px) {
+  /** Return the finest level whose cells are large enough on the screen. */
+  #level(cell_px: number): Level {
     let wanted = 0;
     while (wanted < COARSEST && cell_px * 2 ** wanted < LEAST_PX) {
       wanted += 1;
@@ -79,11 +72,7 @@ export class OccupancyLayer {
   }
 }
 
-/**
- * @param {OccupancyFrame} map
- * @returns {Level}
- */
-function firstLevel({ rows, columns, bits }) {
+function firstLevel({ rows, columns, bits }: OccupancyFrame): Level {
   const cells = new Uint8Array(rows * columns);
   for (let i = 0; i < cells.length; i += 1) {
     cells[i] = bits[i >> 3] >> (i & 7) & 1;
@@ -91,13 +80,8 @@ function firstLevel({ rows, columns, bits }) {
   return { coarseness: 0, rows, columns, cells, picture: null };
 }
 
-/**
- * Merge four cells into one, which is occupied if any of them is, so that no wall gets lost.
- *
- * @param {Level} level
- * @returns {Level}
- */
-function coarser({ coarseness, rows, columns, cells }) {
+/** Merge four cells into one, which is occupied if any of them is, so that no wall gets lost. */
+function coarser({ coarseness, rows, columns, cells }: Level): Level {
   const height = Math.ceil(rows / 2);
   const width = Math.ceil(columns / 2);
   const joined = new Uint8Array(height * width);
@@ -112,15 +96,11 @@ function coarser({ coarseness, rows, columns, cells }) {
   };
 }
 
-/**
- * @param {Level} level
- * @param {string} color
- */
-function paint({ rows, columns, cells }, color) {
+function paint({ rows, columns, cells }: Level, color: string) {
   const canvas = document.createElement('canvas');
   canvas.width = columns;
   canvas.height = rows;
-  const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
+  const context = canvas.getContext('2d') as CanvasRenderingContext2D;
   const image = context.createImageData(columns, rows);
   for (let i = 0; i < cells.length; i += 1) {
     image.data[4 * i + 3] = 255 * cells[i];

@@ -12,19 +12,16 @@ import { OccupancyLayer } from './occupancy_layer.js';
 import { RayLayer } from './ray_layer.js';
 import { countText, Unseen } from './unseen.js';
 
-/** @import { Connection } from '../connection.js' */
-/** @import { Store } from '../store.js' */
-/** @import { DrawLayer, LiveView, Place } from '../world/painter.js' */
-/** @import { World } from '../world/world.js' */
+import type { Connection } from '../connection.js';
+import type { Store } from '../store.js';
+import type { DrawLayer, LiveView, Place } from '../world/painter.js';
+import type { World } from '../world/world.js';
 
-/** @typedef {'unseen'|'rays'|'estimate'|'occupancy'} LayerName */
+export type LayerName = 'unseen' | 'rays' | 'estimate' | 'occupancy';
 
 // name: [strokes of its button, title, whether it is on at first, needs a perceiving AV]
-/**
- * @type {Record<LayerName,
- *   [strokes: string, title: string, first: boolean, needsAv: boolean]>}
- */
-const LAYERS = {
+const LAYERS: Record<LayerName,
+  [strokes: string, title: string, first: boolean, needsAv: boolean]> = {
   unseen: ['M3 3l18 18M10 6a9 9 0 0 1 11 6a12 12 0 0 1-3 4M6 8a12 12 0 0 0-3 4'
     + 'a9 9 0 0 0 12 5', 'Outlines of objects that the followed AV does not see', true, true],
   rays: ['M4 12L20 4M4 12h16M4 12l16 8M3 12h.01', 'Rays of its sensors', false, true],
@@ -32,24 +29,21 @@ const LAYERS = {
     'Its estimated pose', false, true],
   occupancy: ['M3 3h8v8H3zM13 13h8v8h-8zM13 3h8v8h-8z', 'Permanent obstacles', true, false],
 };
+
 // Prefix of layer names: another part may have a layer called rays.
 const PREFIX = 'perception_';
 const COUNT_EVERY_MS = 200;
-const NAMES = /** @type {LayerName[]} */ (Object.keys(LAYERS));
+const NAMES = Object.keys(LAYERS) as LayerName[];
 
 /** The layers of perception of one world. */
 class Perception {
   #store;
   #connection;
   #world;
-  /** @type {Unseen|null} */
-  #unseen = null;
-  /** @type {Uint8Array|null} */
-  #flags = null;
-  /** @type {Partial<Record<LayerName, boolean>>} */
-  #on = {};
-  /** @type {Map<LayerName, HTMLButtonElement>} */
-  #buttons = new Map();
+  #unseen: Unseen | null = null;
+  #flags: Uint8Array | null = null;
+  #on: Partial<Record<LayerName, boolean>> = {};
+  #buttons = new Map<LayerName, HTMLButtonElement>();
   #group;
   #rays = new RayLayer();
   #estimate = new EstimateLayer();
@@ -58,13 +52,7 @@ class Perception {
   #sentLayers = '';
   #legended = '';
 
-  /**
-   * @param {HTMLElement} stage
-   * @param {Store} store
-   * @param {Connection} connection
-   * @param {World} world
-   */
-  constructor(stage, store, connection, world) {
+  constructor(stage: HTMLElement, store: Store, connection: Connection, world: World) {
     this.#store = store;
     this.#connection = connection;
     this.#world = world;
@@ -112,9 +100,9 @@ class Perception {
   /**
    * Return how many of the near objects the followed AV sees.
    *
-   * @returns {{seen: number, near: number, range: number|null}|null} null unless it perceives
+   * @returns null unless it perceives
    */
-  get count() {
+  get count(): { seen: number; near: number; range: number | null } | null {
     const { shown } = this.#world;
     const av = this.#av();
     const columns = shown === null || av < 0 ? null
@@ -126,10 +114,10 @@ class Perception {
   /**
    * Show or hide a layer, and remember it.
    *
-   * @param {LayerName} name unseen, rays, estimate or occupancy
-   * @param {boolean} on whether it is shown
+   * @param name unseen, rays, estimate or occupancy
+   * @param on whether it is shown
    */
-  set(name, on) {
+  set(name: LayerName, on: boolean) {
     this.#on[name] = on;
     remember(`layer.${name}`, on ? 'on' : 'off');
     if (name !== 'unseen') {
@@ -143,27 +131,22 @@ class Perception {
     this.#world.redraw();
   }
 
-  /** @param {World} world */
-  #addLayers(world) {
+  #addLayers(world: World) {
     world.drawHollow((view) => this.#choose(view));
-    /** @type {(name: LayerName, draw: DrawLayer, where: Place) => void} */
-    const add = (name, draw, where) => world.addLayer(PREFIX + name, (context, view) => {
-      if (view.insight) {
-        draw(context, view);
-      }
-    }, where);
+    const add = (name: LayerName, draw: DrawLayer, where: Place) => (
+      world.addLayer(PREFIX + name, (context, view) => {
+        if (view.insight) {
+          draw(context, view);
+        }
+      }, where));
     add('occupancy', (context, view) => this.#occupancy.draw(context, view), 'below');
     add('rays', (context, view) => this.#rays.draw(context, view, this.#av()), 'below');
     add('estimate', (context, view) => this.#estimate.draw(
       context, view, world.vehicle(this.#av()), this.#av()), 'above');
   }
 
-  /**
-   * Return whether a layer is drawn: in the 3D view only if it is requested there.
-   *
-   * @param {LayerName} name
-   */
-  #shows(name) {
+  /** Return whether a layer is drawn: in the 3D view only if it is requested there. */
+  #shows(name: LayerName) {
     return Boolean(this.#on[name]) && this.#world.insight;
   }
 
@@ -220,12 +203,8 @@ class Perception {
     }
   }
 
-  /**
-   * Choose the objects that are drawn as outlines, in each frame.
-   *
-   * @param {LiveView} view
-   */
-  #choose({ store, shown }) {
+  /** Choose the objects that are drawn as outlines, in each frame. */
+  #choose({ store, shown }: LiveView) {
     this.#sendLayers();
     const av = this.#shows('unseen') ? this.#av() : -1;
     const columns = av < 0 ? null : store.perceived.seenBy(av, shown.t);
@@ -234,12 +213,8 @@ class Perception {
     return this.#flags;
   }
 
-  /**
-   * Show in the instruments how many of the near objects are seen.
-   *
-   * @param {HTMLElement} stage
-   */
-  #showCount(stage) {
+  /** Show in the instruments how many of the near objects are seen. */
+  #showCount(stage: HTMLElement) {
     const line = stage.querySelector('.hud-seen');
     if (line !== null) {
       const count = this.#world.insight ? this.count : null;
@@ -252,11 +227,9 @@ class Perception {
 /**
  * Put the layers of perception on the world.
  *
- * @param {HTMLElement} stage that holds the canvas
- * @param {Store} store
- * @param {Connection} connection
- * @returns {Perception}
+ * @param stage that holds the canvas
  */
-export function createPerception(stage, store, connection) {
+export function createPerception(stage: HTMLElement, store: Store,
+  connection: Connection): Perception {
   return new Perception(stage, store, connection, window.crgame.world);
 }

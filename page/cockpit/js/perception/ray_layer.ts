@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The rays of an AV's sensors: a fan up to what they hit, and the line of the hits. */
 
-/** @import { Scan, ScanFrame } from '../frames.js' */
-/** @import { LiveView } from '../world/painter.js' */
+import type { Scan, ScanFrame } from '../frames.js';
+import type { LiveView } from '../world/painter.js';
 
 const FAN_ALPHA = 0.13;
 const HIT_ALPHA = 0.95;
@@ -17,23 +17,23 @@ const STEPS = 4;
 // Drawn length of a single hit [m].
 const DOT_M = 0.15;
 
-/** @typedef {{fan: Path2D, hits: Path2D}} Paths */
+export interface Paths { fan: Path2D; hits: Path2D }
 
 /** The layer that draws the scans of one AV, with paths built once per scan. */
 export class RayLayer {
   /** Number of fans drawn in the last frame. */
   drawn = 0;
-  /** @type {WeakMap<ScanFrame, Paths>} */
-  #paths = new WeakMap();
+  #paths = new WeakMap<ScanFrame, Paths>();
 
   /**
    * Draw the scans of an AV at the poses of their sensors at the time of the scan.
    *
-   * @param {CanvasRenderingContext2D} context of the world
-   * @param {LiveView} view as layers get it
-   * @param {number} av index of the AV; -1 draws nothing
+   * @param context of the world
+   * @param view as layers get it
+   * @param av index of the AV; -1 draws nothing
    */
-  draw(context, { camera, palette, ratio, store, shown }, av) {
+  draw(context: CanvasRenderingContext2D, { camera, palette, ratio, store, shown }: LiveView,
+    av: number) {
     const scans = av < 0 ? [] : store.perceived.scansOf(av, shown.t);
     this.drawn = scans.length;
     for (const scan of scans) {
@@ -49,11 +49,7 @@ export class RayLayer {
     }
   }
 
-  /**
-   * @param {ScanFrame} scan
-   * @returns {Paths}
-   */
-  #pathsOf(scan) {
+  #pathsOf(scan: ScanFrame): Paths {
     let paths = this.#paths.get(scan);
     if (paths === undefined) {
       paths = build(scan);
@@ -63,13 +59,8 @@ export class RayLayer {
   }
 }
 
-/**
- * Build the paths in metres around the sensor, along the axes of the map.
- *
- * @param {Scan} scan
- * @returns {Paths}
- */
-function build({ yaw, first, increment, longest, ranges }) {
+/** Build the paths in metres around the sensor, along the axes of the map. */
+function build({ yaw, first, increment, longest, ranges }: Scan): Paths {
   const fan = new Path2D();
   const hits = new Path2D();
   const count = ranges.length;

@@ -4,35 +4,35 @@
 
 import { OBJECT_WIDTH, VEHICLE_WIDTH } from '../frames.js';
 
-/** @import { Scene } from '../messages.js' */
+import type { Scene } from '../messages.js';
 
 /** The seen and unseen objects of one AV, for one scene; its arrays are refilled. */
 export class Unseen {
   #scene;
   #flags;
 
-  /** @param {Scene} scene the scene document */
-  constructor(scene) {
+  /** @param scene the scene document */
+  constructor(scene: Scene) {
     this.#scene = scene;
     this.#flags = new Uint8Array(scene.vehicles.length + scene.objects.length);
   }
 
   /**
-   * @param {string|null} id of a vehicle
-   * @returns {number} its index if it is an AV with perception, else -1
+   * @param id of a vehicle
+   * @returns its index if it is an AV with perception, else -1
    */
-  perceiving(id) {
+  perceiving(id: string | null): number {
     return this.#scene.vehicles.findIndex((item) => item.id === id && item.perception);
   }
 
   /**
    * Mark the objects that are not seen, whether present or not.
    *
-   * @param {number} av index of the AV
-   * @param {Float64Array} columns of the seen objects
-   * @returns {Uint8Array} 1 for each vehicle, then object, that is not seen
+   * @param av index of the AV
+   * @param columns of the seen objects
+   * @returns 1 for each vehicle, then object, that is not seen
    */
-  flags(av, columns) {
+  flags(av: number, columns: Float64Array): Uint8Array {
     this.#flags.fill(1);
     this.#flags[av] = 0;
     for (const column of columns) {
@@ -44,19 +44,20 @@ export class Unseen {
   /**
    * Return how many objects are within an AV's sensor range, and how many of them are seen.
    *
-   * @param {number} av index of the AV
-   * @param {Float64Array} columns of the seen objects
-   * @param {{vehicles: Float64Array, objects: Float64Array}} shown of Store.displayed
-   * @returns {{seen: number, near: number, range: number|null}} range [m], null for no limit
+   * @param av index of the AV
+   * @param columns of the seen objects
+   * @param shown of Store.displayed
+   * @returns range [m], null for no limit
    */
-  count(av, columns, { vehicles, objects }) {
+  count(av: number, columns: Float64Array,
+    { vehicles, objects }: { vehicles: Float64Array; objects: Float64Array }): { seen: number;
+    near: number; range: number | null } {
     const range = this.#scene.vehicles[av].perception?.range ?? null;
     const flags = this.flags(av, columns);
     const x = vehicles[av * VEHICLE_WIDTH];
     const y = vehicles[av * VEHICLE_WIDTH + 1];
     const total = { seen: 0, near: 0, range };
-    /** @type {(otherX: number, otherY: number, column: number) => void} */
-    const add = (otherX, otherY, column) => {
+    const add = (otherX: number, otherY: number, column: number) => {
       // False for NaN: an absent object is not near.
       if (column !== av && Math.hypot(otherX - x, otherY - y) <= (range ?? Infinity)) {
         total.near += 1;
@@ -77,9 +78,10 @@ export class Unseen {
 /**
  * Return a count in words.
  *
- * @param {{seen: number, near: number, range: number|null}} count of `Unseen.count`
- * @returns {string} sees 3 of 4 within 80 m
+ * @param count of `Unseen.count`
+ * @returns sees 3 of 4 within 80 m
  */
-export function countText({ seen, near, range }) {
+export function countText(
+  { seen, near, range }: { seen: number; near: number; range: number | null }): string {
   return `sees ${seen} of ${near}${range === null ? '' : ` within ${Math.round(range)} m`}`;
 }

@@ -4,7 +4,7 @@
 
 import { KIND } from '../frames.js';
 
-/** @import { ReplayInfo } from '../replay_messages.js' */
+import type { ReplayInfo } from '../replay_messages.js';
 
 // Number of chunks kept: a little more than two seeks and the way between them need; 5 s each.
 const KEPT = 12;
@@ -14,12 +14,11 @@ const RETRY_MS = 1000;
 /**
  * Read an answer of the server.
  *
- * @param {string} path below /api/replay/
- * @param {Record<string, number>} query values by name
- * @returns {Promise<Response>}
+ * @param path below /api/replay/
+ * @param query values by name
  * @throws {Error} with a readable text
  */
-export async function ask(path, query) {
+export async function ask(path: string, query: Record<string, number>): Promise<Response> {
   const answer = await fetch(`api/replay/${path}?${queryOf(query)}`);
   if (!answer.ok) {
     const { error } = await answer.json().catch(() => ({}));
@@ -28,18 +27,16 @@ export async function ask(path, query) {
   return answer;
 }
 
-/** @param {Record<string, number>} query */
-function queryOf(query) {
+function queryOf(query: Record<string, number>) {
   return new URLSearchParams(Object.entries(query).map(([name, value]) => [name, `${value}`]));
 }
 
 /**
  * Split packed frames.
  *
- * @param {ArrayBuffer} packed frames, each after its length in bytes
- * @returns {ArrayBuffer[]}
+ * @param packed frames, each after its length in bytes
  */
-export function unpack(packed) {
+export function unpack(packed: ArrayBuffer): ArrayBuffer[] {
   const view = new DataView(packed);
   const frames = [];
   for (let at = 0; at < packed.byteLength;) {
@@ -50,32 +47,29 @@ export function unpack(packed) {
   return frames;
 }
 
-/**
- * @typedef {object} Entry a frame of a chunk
- * @property {number} at time from which it is shown [s]
- * @property {number} kind
- * @property {string} slot of two entries with the same slot the later replaces the earlier
- * @property {ArrayBuffer} buffer the frame
- */
+/** A frame of a chunk. */
+export interface Entry {
+  at: number; // time from which it is shown [s]
+  kind: number;
+  slot: string; // of two entries with the same slot the later replaces the earlier
+  buffer: ArrayBuffer; // the frame
+}
 
 /** The chunks of one run that are in memory. */
 export class Chunks {
   #info;
-  /** @type {Map<number, Entry[]>} */
-  #chunks = new Map();
-  /** @type {Set<number>} */
-  #asked = new Set();
-  /** @type {Map<number, number>} */
-  #failed = new Map();
+  #chunks = new Map<number, Entry[]>();
+  #asked = new Set<number>();
+  #failed = new Map<number, number>();
   #loaded;
   #refused;
 
   /**
-   * @param {ReplayInfo} info of the run
-   * @param {() => void} loaded called after a chunk has come
-   * @param {(error: Error) => void} refused called if one cannot be loaded
+   * @param info of the run
+   * @param loaded called after a chunk has come
+   * @param refused called if one cannot be loaded
    */
-  constructor(info, loaded, refused) {
+  constructor(info: ReplayInfo, loaded: () => void, refused: (error: Error) => void) {
     this.#info = info;
     this.#loaded = loaded;
     this.#refused = refused;
@@ -87,29 +81,29 @@ export class Chunks {
   }
 
   /**
-   * @param {number} t [s]
-   * @returns {number} the chunk that holds this time
+   * @param t [s]
+   * @returns the chunk that holds this time
    */
-  numberAt(t) {
+  numberAt(t: number): number {
     const { start_s, chunk_s, chunks } = this.#info;
     return Math.min(Math.max(Math.floor((t - start_s) / chunk_s + 1e-9), 0), chunks - 1);
   }
 
   /**
-   * @param {number} number of a chunk
-   * @returns {Entry[]|undefined} its frames, undefined before they have come
+   * @param number of a chunk
+   * @returns its frames, undefined before they have come
    */
-  get(number) {
+  get(number: number): Entry[] | undefined {
     return this.#chunks.get(number);
   }
 
   /**
    * Request a chunk and those after it.
    *
-   * @param {number} number of the chunk that is shown
-   * @param {number} ahead how many more
+   * @param number of the chunk that is shown
+   * @param ahead how many more
    */
-  want(number, ahead) {
+  want(number: number, ahead: number) {
     for (let i = number; i <= Math.min(number + ahead, this.#info.chunks - 1); i += 1) {
       const known = this.#chunks.get(i);
       if (known !== undefined) {
@@ -122,8 +116,7 @@ export class Chunks {
     }
   }
 
-  /** @param {number} number */
-  async #fetch(number) {
+  async #fetch(number: number) {
     this.#asked.add(number);
     try {
       const answer = await ask('chunk', { i: number, epoch: this.#info.epoch });
@@ -135,7 +128,7 @@ export class Chunks {
       }
     } catch (error) {
       this.#failed.set(number, performance.now() + RETRY_MS);
-      this.#refused(/** @type {Error} */ (error));
+      this.#refused(error as Error);
       return;
     } finally {
       this.#asked.delete(number);
@@ -143,14 +136,8 @@ export class Chunks {
     this.#loaded();
   }
 
-  /**
-   * Return the time from which each frame is shown: a plan from the state that preceded it.
-   *
-   * @param {ArrayBuffer[]} frames
-   * @param {number} number
-   * @returns {Entry[]}
-   */
-  #entries(frames, number) {
+  /** Return the time from which each frame is shown: a plan from the state that preceded it. */
+  #entries(frames: ArrayBuffer[], number: number): Entry[] {
     let at = this.#info.start_s + number * this.#info.chunk_s - 1e-9;
     return frames.map((buffer) => {
       const [kind, , , , t, index, sensor] = new Float64Array(buffer);
@@ -164,12 +151,8 @@ export class Chunks {
 
 /**
  * Return the slot of a frame, which a later frame replaces; each vehicle and sensor has its own.
- *
- * @param {number} kind
- * @param {number} index
- * @param {number} sensor
  */
-function slotOf(kind, index, sensor) {
+function slotOf(kind: number, index: number, sensor: number) {
   switch (kind) {
     case KIND.STATE: case KIND.OBJECTS: case KIND.OCCUPANCY: return `${kind}`;
     case KIND.SCAN: return `${kind}:${index}:${sensor}`;

@@ -4,11 +4,10 @@
 
 import { element, svg } from '../dom.js';
 
-/** @import { ReplayMark } from '../replay_messages.js' */
+import type { ReplayMark } from '../replay_messages.js';
 
 // Shapes on a 12 x 12 grid and the name of each kind; the colours are in replay.css.
-/** @type {Map<string, [shape: string, word: string]>} */
-const KINDS = new Map([
+const KINDS = new Map<string, [shape: string, word: string]>([
   ['collision', ['M6 0L7.6 4.4 12 6 7.6 7.6 6 12 4.4 7.6 0 6 4.4 4.4Z', 'Collision']],
   ['off_road', ['M6 1L12 11H0Z', 'Off the road']],
   ['stale_plan', ['M1 1H11V11H1Z', 'No plan']],
@@ -23,16 +22,15 @@ const KINDS = new Map([
   ['recording', ['M6 0A6 6 0 1 1 5.9 0Z', 'Recording failed']],
   ['gap', ['M1 0H4.5V12H1ZM7.5 0H11V12H7.5Z', 'Not recorded']],
 ]);
-/** @type {[shape: string, word: string]} */
-const OTHER = ['M4 0H8V12H4Z', ''];
+const OTHER: [shape: string, word: string] = ['M4 0H8V12H4Z', ''];
 
 /**
  * Return the text of an event.
  *
- * @param {ReplayMark} event of the replay's info
- * @returns {string} kind, subject, text, count and time
+ * @param event of the replay's info
+ * @returns kind, subject, text, count and time
  */
-export function eventText({ kind, subject, text, count, t }) {
+export function eventText({ kind, subject, text, count, t }: ReplayMark): string {
   const [, word] = KINDS.get(kind) ?? OTHER;
   const head = `${word || kind.replaceAll('_', ' ')}${subject ? ` (${subject})` : ''}`;
   const times = count > 1 ? `, ${count} times` : '';
@@ -42,12 +40,11 @@ export function eventText({ kind, subject, text, count, t }) {
 /**
  * Draw the mark of an event.
  *
- * @param {ReplayMark} event of the replay's info
- * @param {number} share where on the time line, 0 to 1
- * @param {() => void} chosen called when it is clicked
- * @returns {HTMLElement}
+ * @param event of the replay's info
+ * @param share where on the time line, 0 to 1
+ * @param chosen called when it is clicked
  */
-export function mark(event, share, chosen) {
+export function mark(event: ReplayMark, share: number, chosen: () => void): HTMLElement {
   const [shape] = KINDS.get(event.kind) ?? OTHER;
   // Not in the tab order: [ and ] lead from one to the next.
   const node = element('button', {

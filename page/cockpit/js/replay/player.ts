@@ -7,10 +7,10 @@ import { ReplayDocuments } from './documents.js';
 import { ReplayFeed } from './replay_feed.js';
 import { Timeline } from './timeline.js';
 
-/** @import { RunState } from '../messages.js' */
-/** @import { ReplayInfo, ReplayMark } from '../replay_messages.js' */
-/** @import { Store } from '../store.js' */
-/** @import { Now } from './documents.js' */
+import type { RunState } from '../messages.js';
+import type { ReplayInfo, ReplayMark } from '../replay_messages.js';
+import type { Store } from '../store.js';
+import type { Now } from './documents.js';
 
 const SLOWEST = 0.1;
 const FASTEST = 8;
@@ -23,10 +23,8 @@ const SETTLED_MS = 300;
 export class Player {
   #store;
   #timeline;
-  /** @type {ReplayFeed|null} */
-  #feed = null;
-  /** @type {ReplayDocuments|null} */
-  #documents = null;
+  #feed: ReplayFeed | null = null;
+  #documents: ReplayDocuments | null = null;
   #t = 0;
   // The time that the world shows: the last one with data.
   #shown_t = 0;
@@ -35,16 +33,11 @@ export class Player {
   #jumped = false;
   #jumped_ms = NaN;
   #frame_ms = NaN;
-  /** @type {(() => void)[]} */
-  #waiting = [];
+  #waiting: (() => void)[] = [];
   #opening = false;
   #told = '';
 
-  /**
-   * @param {HTMLElement} root
-   * @param {Store} store
-   */
-  constructor(root, store) {
+  constructor(root: HTMLElement, store: Store) {
     this.#store = store;
     this.#timeline = new Timeline(root, this);
     const open = () => {
@@ -60,8 +53,7 @@ export class Player {
         store.receive({ type: 'scene', ...this.info.scene });
       }
     });
-    /** @param {number} now_ms */
-    const frame = (now_ms) => {
+    const frame = (now_ms: number) => {
       this.#advance(now_ms);
       requestAnimationFrame(frame);
     };
@@ -116,10 +108,9 @@ export class Player {
   /**
    * Show a run from its beginning.
    *
-   * @param {number} [epoch] which; the server's choice by default
-   * @returns {Promise<void>}
+   * @param epoch which; the server's choice by default
    */
-  async open(epoch) {
+  async open(epoch?: number): Promise<void> {
     this.#opening = true;
     try {
       const answer = await ask('info', epoch === undefined ? {} : { epoch });
@@ -158,10 +149,10 @@ export class Player {
   /**
    * Go to a time.
    *
-   * @param {number} t [s]; within the recording
-   * @returns {Promise<void>} when it is shown
+   * @param t [s]; within the recording
+   * @returns when it is shown
    */
-  seek(t) {
+  seek(t: number): Promise<void> {
     if (this.info === null) {
       return Promise.resolve();
     }
@@ -176,10 +167,10 @@ export class Player {
   /**
    * Go to exactly the next or another scenario step, and pause.
    *
-   * @param {number} count how many steps on, negative for back
-   * @returns {Promise<void>} when it is shown
+   * @param count how many steps on, negative for back
+   * @returns when it is shown
    */
-  step(count) {
+  step(count: number): Promise<void> {
     this.pause();
     if (this.info === null) {
       return Promise.resolve();
@@ -196,10 +187,10 @@ export class Player {
   /**
    * Go to the next or the previous event.
    *
-   * @param {number} direction 1 or -1
-   * @returns {ReplayMark|null} the event
+   * @param direction 1 or -1
+   * @returns the event
    */
-  jump(direction) {
+  jump(direction: number): ReplayMark | null {
     const events = this.info?.events ?? [];
     const found = direction > 0 ? events.find(({ t }) => t > this.#t + TINY_S)
       : events.findLast(({ t }) => t < this.#t - TINY_S);
@@ -212,11 +203,10 @@ export class Player {
 
   /** Return the run; only used while one is shown. */
   get #run() {
-    return /** @type {ReplayInfo} */ (this.info);
+    return this.info as ReplayInfo;
   }
 
-  /** @param {ReplayInfo} info */
-  #show(info) {
+  #show(info: ReplayInfo) {
     const store = this.#store;
     this.pause();
     store.restart(info.epoch);
@@ -235,8 +225,7 @@ export class Player {
     this.seek(info.start_s);
   }
 
-  /** @param {number} now_ms */
-  #advance(now_ms) {
+  #advance(now_ms: number) {
     const passed_s = Math.min((now_ms - this.#frame_ms) / 1000 || 0, LONGEST_FRAME_S);
     this.#frame_ms = now_ms;
     if (this.#feed === null) {
@@ -259,12 +248,8 @@ export class Player {
     }
   }
 
-  /**
-   * Update everything to the time, and return whether its data was there.
-   *
-   * @param {number} now_ms
-   */
-  #update(now_ms) {
+  /** Update everything to the time, and return whether its data was there. */
+  #update(now_ms: number) {
     const shown = this.#feed?.show(this.#t) ?? NaN;
     const there = !Number.isNaN(shown);
     if (there) {
@@ -280,20 +265,14 @@ export class Player {
     return there;
   }
 
-  /** @returns {Now} */
-  #now() {
+  #now(): Now {
     const ended = this.#t >= this.#run.end_s - TINY_S;
-    /** @type {RunState} */
-    const run = this.#playing ? 'running' : ended ? 'ended' : 'paused';
+    const run: RunState = this.#playing ? 'running' : ended ? 'ended' : 'paused';
     return { t: this.#t, n: this.n, k: this.k, run, speed: this.#speed };
   }
 
-  /**
-   * Show an error once.
-   *
-   * @param {unknown} error
-   */
-  #refuse(error) {
+  /** Show an error once. */
+  #refuse(error: unknown) {
     const text = error instanceof Error ? error.message : String(error);
     if (this.#told !== text) {
       this.#told = text;
@@ -305,10 +284,8 @@ export class Player {
 /**
  * Create the player, which becomes visible when the page shows a recording.
  *
- * @param {HTMLElement} root footer#timeline
- * @param {Store} store
- * @returns {Player}
+ * @param root footer#timeline
  */
-export function createReplay(root, store) {
+export function createReplay(root: HTMLElement, store: Store): Player {
   return new Player(root, store);
 }

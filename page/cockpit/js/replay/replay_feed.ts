@@ -8,11 +8,11 @@ import { addToHistory, emptyHistory } from '../history.js';
 import { countWhile } from '../search.js';
 import { ask, Chunks, unpack } from './chunks.js';
 
-/** @import { StateFrame } from '../frames.js' */
-/** @import { History } from '../history.js' */
-/** @import { ReplayInfo } from '../replay_messages.js' */
-/** @import { Store } from '../store.js' */
-/** @import { Entry } from './chunks.js' */
+import type { StateFrame } from '../frames.js';
+import type { History } from '../history.js';
+import type { ReplayInfo } from '../replay_messages.js';
+import type { Store } from '../store.js';
+import type { Entry } from './chunks.js';
 
 const AHEAD = 2;
 // After a jump, the store gets the states of this time before it [s].
@@ -29,22 +29,19 @@ export class ReplayFeed {
   #chunks;
   // The chunk and the position in it of the next entry.
   #next = { number: 0, place: 0 };
-  /** @type {Entry|null} */
-  #early = null;
+  #early: Entry | null = null;
   #shown = NaN;
-  /** @type {StateFrame[]} */
-  #outline = [];
+  #outline: StateFrame[] = [];
 
   /** The server's description of the run. */
   info;
 
   /**
-   * @param {Store} store
-   * @param {ReplayInfo} info of the run
-   * @param {{loaded: () => void, refused: (error: Error) => void}} told `loaded` after new data
-   *   has come, `refused` if it cannot be loaded
+   * @param info of the run
+   * @param told `loaded` after new data has come, `refused` if it cannot be loaded
    */
-  constructor(store, info, { loaded, refused }) {
+  constructor(store: Store, info: ReplayInfo,
+    { loaded, refused }: { loaded: () => void; refused: (error: Error) => void }) {
     this.#store = store;
     this.info = info;
     this.#chunks = new Chunks(info, loaded, refused);
@@ -65,10 +62,9 @@ export class ReplayFeed {
   /**
    * Request the criticality of the whole run; it takes a while if it was not recorded.
    *
-   * @param {CriticalityLog} log gets it
-   * @param {(error: Error) => void} refused
+   * @param log gets it
    */
-  async #askCriticality(log, refused) {
+  async #askCriticality(log: CriticalityLog, refused: (error: Error) => void) {
     try {
       const answer = await ask('criticality', { epoch: this.info.epoch });
       for (const frame of unpack(await answer.arrayBuffer()).map(decodeFrame)) {
@@ -77,18 +73,17 @@ export class ReplayFeed {
         }
       }
     } catch (error) {
-      refused(/** @type {Error} */ (error));
+      refused(error as Error);
     }
   }
 
   /**
    * Feed the store with the data of a time.
    *
-   * @param {number} t simulation time [s]
-   * @returns {number} the shown time: that of a state close to t, else t; NaN while its data is
-   *   loading
+   * @param t simulation time [s]
+   * @returns the shown time: that of a state close to t, else t; NaN while its data is loading
    */
-  show(t) {
+  show(t: number): number {
     const number = this.#chunks.numberAt(t);
     this.#chunks.want(number, AHEAD);
     const entries = this.#chunks.get(number);
@@ -108,11 +103,10 @@ export class ReplayFeed {
   /**
    * Return a vehicle's motion around the shown time, as `Store.history` does.
    *
-   * @param {number} index of the vehicle
-   * @param {number} seconds how far back
-   * @returns {History}
+   * @param index of the vehicle
+   * @param seconds how far back
    */
-  history(index, seconds) {
+  history(index: number, seconds: number): History {
     const past = emptyHistory();
     const end = this.#shown + FUTURE_S;
     for (let i = this.#outlineFrom(this.#shown - seconds); i < this.#outline.length; i += 1) {
@@ -124,23 +118,13 @@ export class ReplayFeed {
     return past;
   }
 
-  /**
-   * Find the first sample for plots that is not before a time.
-   *
-   * @param {number} t
-   */
-  #outlineFrom(t) {
+  /** Find the first sample for plots that is not before a time. */
+  #outlineFrom(t: number) {
     return countWhile(this.#outline.length, (index) => this.#outline[index].t < t);
   }
 
-  /**
-   * Restart shortly before a time, with the frames of each kind that are still valid then.
-   *
-   * @param {Entry[]} entries
-   * @param {number} number
-   * @param {number} t
-   */
-  #jump(entries, number, t) {
+  /** Restart shortly before a time, with the frames of each kind that are still valid then. */
+  #jump(entries: Entry[], number: number, t: number) {
     this.#store.restart(this.info.epoch);
     const end = entries.findIndex((entry) => entry.at > t + SAME_TIME_S);
     const past = end < 0 ? entries : entries.slice(0, end);
@@ -155,12 +139,8 @@ export class ReplayFeed {
     this.#early = null;
   }
 
-  /**
-   * Advance to a time and one state beyond it, between which the page interpolates.
-   *
-   * @param {number} t
-   */
-  #proceed(t) {
+  /** Advance to a time and one state beyond it, between which the page interpolates. */
+  #proceed(t: number) {
     for (;;) {
       const next = this.#next;
       const entries = this.#chunks.get(next.number);
@@ -183,8 +163,7 @@ export class ReplayFeed {
     }
   }
 
-  /** @param {Entry} entry */
-  #give(entry) {
+  #give(entry: Entry) {
     if (entry !== this.#early) {
       this.#store.receiveFrame(entry.buffer, performance.now());
     }

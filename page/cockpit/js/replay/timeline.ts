@@ -5,13 +5,12 @@
 import { element, setAttribute, setText, svg } from '../dom.js';
 import { eventText, mark } from './marks.js';
 
-/** @import { ReplayInfo, ReplayMark } from '../replay_messages.js' */
-/** @import { Player } from './player.js' */
+import type { ReplayInfo, ReplayMark } from '../replay_messages.js';
+import type { Player } from './player.js';
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 const PAGE_S = 5;
-/** @type {Record<string, string>} */
-const ICONS = {
+const ICONS: Record<string, string> = {
   play: 'M6 4L20 12 6 20Z', pause: 'M6 4H10V20H6ZM14 4H18V20H14Z',
   back: 'M17 4V20L7 12ZM4 4H7V20H4Z', on: 'M7 4V20L17 12ZM17 4H20V20H17Z',
   previous: 'M12 5V19L3 12ZM21 5V19L12 12Z', next: 'M12 5V19L21 12ZM3 5V19L12 12Z',
@@ -34,10 +33,10 @@ export class Timeline {
   #told = element('span', { class: 'timeline-event', role: 'status' });
 
   /**
-   * @param {HTMLElement} root footer#timeline; hidden until there is a recording
-   * @param {Player} player that is controlled
+   * @param root footer#timeline; hidden until there is a recording
+   * @param player that is controlled
    */
-  constructor(root, player) {
+  constructor(root: HTMLElement, player: Player) {
     this.#root = root;
     this.#player = player;
     const steps = [
@@ -74,9 +73,9 @@ export class Timeline {
   /**
    * Start showing a run.
    *
-   * @param {ReplayInfo} info of the run
+   * @param info of the run
    */
-  show(info) {
+  show(info: ReplayInfo) {
     this.#root.hidden = false;
     setAttribute(this.#slider, 'min', String(info.first_n));
     setAttribute(this.#slider, 'max', String(info.last_n));
@@ -117,26 +116,21 @@ export class Timeline {
   /**
    * Show the event that was jumped to.
    *
-   * @param {ReplayMark} event of the run's info
+   * @param event of the run's info
    */
-  showEvent(event) {
+  showEvent(event: ReplayMark) {
     setText(this.#told, eventText(event));
   }
 
   /** Return the run's description; only used while a run is shown. */
   get #info() {
-    return /** @type {ReplayInfo} */ (this.#player.info);
+    return this.#player.info as ReplayInfo;
   }
 
-  /**
-   * Move by scenario steps when arrow keys are pressed on the slider.
-   *
-   * @param {KeyboardEvent} event
-   */
-  #slide(event) {
+  /** Move by scenario steps when arrow keys are pressed on the slider. */
+  #slide(event: KeyboardEvent) {
     const player = this.#player;
-    /** @type {Record<string, () => void>} */
-    const moves = {
+    const moves: Record<string, () => void> = {
       ArrowLeft: () => player.step(-1), ArrowDown: () => player.step(-1),
       ArrowRight: () => player.step(1), ArrowUp: () => player.step(1),
       PageDown: () => player.seek(player.t - PAGE_S), PageUp: () => player.seek(player.t + PAGE_S),
@@ -149,8 +143,7 @@ export class Timeline {
     }
   }
 
-  /** @param {KeyboardEvent} event */
-  #key(event) {
+  #key(event: KeyboardEvent) {
     const { target } = event;
     if (this.#root.hidden || event.ctrlKey || event.metaKey || event.altKey
         || document.querySelector('dialog[open]')
@@ -159,8 +152,7 @@ export class Timeline {
       return;
     }
     const player = this.#player;
-    /** @type {Record<string, () => void>} */
-    const keys = {
+    const keys: Record<string, () => void> = {
       ',': () => player.step(-1), '.': () => player.step(1),
       ArrowLeft: () => player.step(-1), ArrowRight: () => player.step(1),
       '[': () => player.jump(-1), ']': () => player.jump(1), ' ': () => player.toggle(),
@@ -176,19 +168,12 @@ export class Timeline {
   }
 }
 
-/**
- * @param {string} name
- * @param {string} label
- * @param {string} key
- * @param {() => void} pressed
- */
-function button(name, label, key, pressed) {
+function button(name: string, label: string, key: string, pressed: () => void) {
   return element('button', { type: 'button', 'data-action': name, 'aria-label': label,
     'aria-keyshortcuts': key, title: `${label} (${key})`, on: { click: pressed } }, picture(name));
 }
 
-/** @param {string} name */
-function picture(name) {
+function picture(name: string) {
   return svg('svg', { viewBox: '0 0 24 24', 'aria-hidden': 'true' },
     svg('path', { d: ICONS[name] }));
 }

@@ -2,58 +2,39 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The speed of an engine or motor at a road speed, and the choice of the gear. */
 
-/**
- * The drive train between engine and road.
- *
- * @typedef {object} DriveTrain
- * @property {'car'|'heavy'|'electric'|'muscle'} name
- * @property {number[]} ratios of the gears, in order
- * @property {number} reverse_ratio
- * @property {number} final_drive
- * @property {number} wheel_radius_m
- * @property {number} idle_rpm 0 for a motor that stands with its wheels
- * @property {number} limit_rpm
- * @property {number} order of the strongest tone:
- *   tone = turns per second * order
- */
+/** The drive train between engine and road. */
+export interface DriveTrain {
+  name: 'car' | 'heavy' | 'electric' | 'muscle';
+  ratios: number[]; // of the gears, in order
+  reverse_ratio: number;
+  final_drive: number;
+  wheel_radius_m: number;
+  idle_rpm: number; // 0 for a motor that stands with its wheels
+  limit_rpm: number;
+  order: number; // of the strongest tone: tone = turns per second * order
+}
 
-/**
- * Four cylinders, four strokes: two firings a turn. Six gears of a ZF 6HP automatic gearbox.
- *
- * @type {DriveTrain}
- */
-export const CAR = Object.freeze({
+/** Four cylinders, four strokes: two firings a turn. Six gears of a ZF 6HP automatic gearbox. */
+export const CAR: DriveTrain = Object.freeze({
   name: 'car', ratios: [4.171, 2.34, 1.521, 1.143, 0.867, 0.691], reverse_ratio: 3.403,
   final_drive: 3.46, wheel_radius_m: 0.31, idle_rpm: 800, limit_rpm: 6500, order: 2,
 });
 
-/**
- * A lorry's or bus's Diesel: six cylinders, three firings a turn, twelve evenly spaced gears.
- *
- * @type {DriveTrain}
- */
-export const HEAVY = Object.freeze({
+/** A lorry's or bus's Diesel: six cylinders, three firings a turn, twelve evenly spaced gears. */
+export const HEAVY: DriveTrain = Object.freeze({
   name: 'heavy', ratios: Array.from({ length: 12 }, (_, gear) => 14.94 ** (1 - gear / 11)),
   reverse_ratio: 14.0, final_drive: 2.6, wheel_radius_m: 0.5, idle_rpm: 600, limit_rpm: 2200,
   order: 3,
 });
 
-/**
- * A motor of four pole pairs behind one reduction: its torque pulses eight times a turn.
- *
- * @type {DriveTrain}
- */
-export const ELECTRIC = Object.freeze({
+/** A motor of four pole pairs behind one reduction: its torque pulses eight times a turn. */
+export const ELECTRIC: DriveTrain = Object.freeze({
   name: 'electric', ratios: [1], reverse_ratio: 1, final_drive: 9.0, wheel_radius_m: 0.31,
   idle_rpm: 0, limit_rpm: 14000, order: 8,
 });
 
-/**
- * A rider: what a bicycle sounds like is its tyres.
- *
- * @type {DriveTrain}
- */
-export const MUSCLE = Object.freeze({
+/** A rider: what a bicycle sounds like is its tyres. */
+export const MUSCLE: DriveTrain = Object.freeze({
   name: 'muscle', ratios: [1], reverse_ratio: 1, final_drive: 1, wheel_radius_m: 0.34,
   idle_rpm: 0, limit_rpm: 420, order: 1,
 });
@@ -68,25 +49,24 @@ const LAUNCH = 0.2;
 export const REVERSE = -1;
 
 /**
- * @param {DriveTrain} train
- * @param {number} gear index of a ratio, or REVERSE
- * @param {number} speed of the road, without a sign [m/s]
- * @returns {number} engine speed if it were locked to the wheels [rpm]
+ * @param gear index of a ratio, or REVERSE
+ * @param speed of the road, without a sign [m/s]
+ * @returns engine speed if it were locked to the wheels [rpm]
  */
-export function lockedSpeed_rpm(train, gear, speed) {
+export function lockedSpeed_rpm(train: DriveTrain, gear: number, speed: number): number {
   const ratio = gear === REVERSE ? train.reverse_ratio : train.ratios[gear];
   return speed / train.wheel_radius_m * ratio * train.final_drive * 60 / (2 * Math.PI);
 }
 
 /**
- * @param {DriveTrain} train
- * @param {number} gear index of a ratio, or REVERSE
- * @param {number} speed without a sign [m/s]
- * @param {number} throttle 0 to 1
- * @returns {number} engine speed: locked to the wheels, but at least idling; in the lowest
- *   gears more while the clutch slips [rpm]
+ * @param gear index of a ratio, or REVERSE
+ * @param speed without a sign [m/s]
+ * @param throttle 0 to 1
+ * @returns engine speed: locked to the wheels, but at least idling; in the lowest gears more while
+ *   the clutch slips [rpm]
  */
-export function engineSpeed_rpm(train, gear, speed, throttle) {
+export function engineSpeed_rpm(train: DriveTrain, gear: number, speed: number,
+  throttle: number): number {
   const slipping = gear <= 0 ? LAUNCH * throttle * (train.limit_rpm - train.idle_rpm) : 0;
   const least = train.idle_rpm === 0 ? 0 : train.idle_rpm + slipping;
   return Math.min(Math.max(lockedSpeed_rpm(train, gear, speed), least), train.limit_rpm);
@@ -95,15 +75,15 @@ export function engineSpeed_rpm(train, gear, speed, throttle) {
 /**
  * Choose the gear: up where the engine turns too fast for the throttle, down where too slowly.
  *
- * @param {DriveTrain} train
- * @param {number} gear that is in
- * @param {number} speed without a sign [m/s]
- * @param {number} throttle 0 to 1
- * @returns {number} index of a ratio
+ * @param gear that is in
+ * @param speed without a sign [m/s]
+ * @param throttle 0 to 1
+ * @returns index of a ratio
  */
-export function gearAfter(train, gear, speed, throttle) {
-  /** @type {(share: {released: number, floored: number}) => number} */
-  const rpm = ({ released, floored }) => train.idle_rpm
+export function gearAfter(train: DriveTrain, gear: number, speed: number,
+  throttle: number): number {
+  const rpm = (
+    { released, floored }: { released: number; floored: number }): number => train.idle_rpm
     + (train.limit_rpm - train.idle_rpm) * (released + floored * throttle);
   let next = Math.max(gear, 0);
   while (next + 1 < train.ratios.length && lockedSpeed_rpm(train, next, speed) > rpm(UP)) {
@@ -116,19 +96,17 @@ export function gearAfter(train, gear, speed, throttle) {
 }
 
 /**
- * @param {DriveTrain} train
- * @param {number} rpm of the engine
- * @returns {number} its strongest tone [Hz]
+ * @param rpm of the engine
+ * @returns its strongest tone [Hz]
  */
-export function tone_Hz(train, rpm) {
+export function tone_Hz(train: DriveTrain, rpm: number): number {
   return rpm / 60 * train.order;
 }
 
 /**
- * @param {DriveTrain} train
- * @param {number} rpm of the engine
- * @returns {number} 0 at idling, 1 at the limit
+ * @param rpm of the engine
+ * @returns 0 at idling, 1 at the limit
  */
-export function speedShare(train, rpm) {
+export function speedShare(train: DriveTrain, rpm: number): number {
   return (rpm - train.idle_rpm) / (train.limit_rpm - train.idle_rpm);
 }

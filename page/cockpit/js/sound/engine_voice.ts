@@ -6,8 +6,8 @@ import { tone_Hz } from './drive_train.js';
 import { engineLevel } from './levels.js';
 import { engineWave, mainPartial, makeFilter, Value } from './voices.js';
 
-/** @import { DriveTrain } from './drive_train.js' */
-/** @import { Driven } from './listener.js' */
+import type { DriveTrain } from './drive_train.js';
+import type { Driven } from './listener.js';
 
 const CALM = 1.7;
 const HARSH = 0.7;
@@ -22,16 +22,13 @@ export class EngineVoice {
   #calm;
   #harsh;
   #filter;
-  /** @type {Value[]} */
-  #frequencies;
+  #frequencies: Value[];
   #cutoff;
   #calmGain;
   #harshGain;
-  /** @type {DriveTrain|null} */
-  #train = null;
+  #train: DriveTrain | null = null;
 
-  /** @param {BaseAudioContext} context */
-  constructor(context) {
+  constructor(context: BaseAudioContext) {
     this.#context = context;
     this.#calm = context.createOscillator();
     this.#harsh = context.createOscillator();
@@ -50,11 +47,8 @@ export class EngineVoice {
     this.output = this.#filter;
   }
 
-  /**
-   * @param {Pick<Driven, 'train'|'rpm'|'load'>} own
-   * @param {number} when time of the context [s]
-   */
-  update({ train, rpm, load }, when) {
+  /** @param when time of the context [s] */
+  update({ train, rpm, load }: Pick<Driven, 'train' | 'rpm' | 'load'>, when: number) {
     const frequency = tone_Hz(train, rpm) / mainPartial(train);
     if (train !== this.#train) {
       // After a change of the vehicle there is a moment of silence: `SoundGraph.hush`.

@@ -13,41 +13,38 @@ const AROUND_M = 1.5;
 // A higher speed comes from a wrong state [m/s].
 const MOST_SPEED = 100;
 
-/**
- * @typedef {{x: number, y: number, yaw: number, vx: number, vy: number}} Moving a point with its
- *   heading and velocity in frame map [m, rad, m/s]
- * @typedef {{distance: number, pan: number, doppler: number}} Arrival
- */
+/** A point with its heading and velocity in frame map [m, rad, m/s]. */
+export interface Moving { x: number; y: number; yaw: number; vx: number; vy: number }
+export interface Arrival { distance: number; pan: number; doppler: number }
 
 /**
  * Return the Doppler factor in still air: c / (c - v) for a source that approaches at v,
  * (c + v) / c for an ear that does.
  *
- * @param {number} source at which the source approaches the ear [m/s]
- * @param {number} ear at which the ear approaches the source [m/s]
- * @returns {number} heard frequency over the source's
+ * @param source at which the source approaches the ear [m/s]
+ * @param ear at which the ear approaches the source [m/s]
+ * @returns heard frequency over the source's
  */
-export function dopplerFactor(source, ear) {
+export function dopplerFactor(source: number, ear: number): number {
   return (SOUND_SPEED + clip(ear, MOST_SPEED)) / (SOUND_SPEED - clip(source, MOST_SPEED));
 }
 
 /**
  * Return the attenuation: pressure falls with 1 / distance, and fades to 0 at the range.
  *
- * @param {number} distance [m]
- * @returns {number} 1 near by, 0 beyond RANGE_M
+ * @param distance [m]
+ * @returns 1 near by, 0 beyond RANGE_M
  */
-export function attenuation(distance) {
+export function attenuation(distance: number): number {
   const faded = 1 - (distance / RANGE_M) ** 2;
   return Math.max(faded, 0) * NEAR_M / Math.max(distance, NEAR_M);
 }
 
 /**
- * @param {Moving} ear of a driver
- * @param {Moving} source
- * @returns {Arrival} distance [m], pan (-1 left, 0 ahead or behind, 1 right), Doppler factor
+ * @param ear of a driver
+ * @returns distance [m], pan (-1 left, 0 ahead or behind, 1 right), Doppler factor
  */
-export function arrival(ear, source) {
+export function arrival(ear: Moving, source: Moving): Arrival {
   const dx = source.x - ear.x;
   const dy = source.y - ear.y;
   const distance = Math.hypot(dx, dy);
@@ -62,10 +59,6 @@ export function arrival(ear, source) {
   };
 }
 
-/**
- * @param {number} value
- * @param {number} most
- */
-function clip(value, most) {
+function clip(value: number, most: number) {
   return Math.min(Math.max(value, -most), most);
 }

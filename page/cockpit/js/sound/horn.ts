@@ -14,24 +14,18 @@ const GONE_S = 0.2;
 export class Horn {
   #context;
   #out;
-  /** @type {{oscillators: OscillatorNode[], pitches: Value[], gain: Value}|null} */
-  #sounding = null;
+  #sounding: { oscillators: OscillatorNode[]; pitches: Value[]; gain: Value } | null = null;
 
-  /**
-   * @param {BaseAudioContext} context
-   * @param {AudioNode} out
-   */
-  constructor(context, out) {
+  constructor(context: BaseAudioContext, out: AudioNode) {
     this.#context = context;
     this.#out = out;
   }
 
   /**
-   * @param {boolean} on
-   * @param {number} doppler by which the notes are shifted
-   * @param {number} when time of the context [s]
+   * @param doppler by which the notes are shifted
+   * @param when time of the context [s]
    */
-  update(on, doppler, when) {
+  update(on: boolean, doppler: number, when: number) {
     if (on && this.#sounding === null) {
       this.#sounding = this.#begin(doppler, when);
     } else if (!on && this.#sounding !== null) {
@@ -42,11 +36,7 @@ export class Horn {
     this.#sounding?.pitches.forEach((pitch, i) => pitch.to(NOTES_Hz[i] * doppler, when));
   }
 
-  /**
-   * @param {number} doppler
-   * @param {number} when
-   */
-  #begin(doppler, when) {
+  #begin(doppler: number, when: number) {
     const level = this.#context.createGain();
     const gain = new Value(level.gain, 0, ATTACK_S);
     const filter = makeFilter(this.#context, 'lowpass', 3000);

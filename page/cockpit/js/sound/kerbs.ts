@@ -5,12 +5,11 @@
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { RoadIndex } from '../view3d/road/road_index.js';
 
-/** @import { Lanelet, Scene, SceneVehicle } from '../messages.js' */
-/** @import { Shown } from '../store.js' */
+import type { Lanelet, Scene, SceneVehicle } from '../messages.js';
+import type { Shown } from '../store.js';
 
 // Strength of the impact on each kind of kerb, as a share of the hardest.
-/** @type {Record<string, number>} */
-const STRENGTH = { curb: 1, lowered_curb: 0.35 };
+const STRENGTH: Record<string, number> = { curb: 1, lowered_curb: 0.35 };
 // Distance of a tyre's middle from the side of its vehicle [m].
 const TYRE_M = 0.1;
 // Longest way of wheels since the last call: this plus twice their speed times the time [m].
@@ -18,17 +17,14 @@ const SLACK_M = 0.5;
 // A kerb ends this far before another lanelet, as in the driver's view [m].
 const WITHIN_M = 0.3;
 
-/** @typedef {[x: number, y: number]} Point */
+export type Point = [x: number, y: number];
 
 /** A detector of kerbs that one vehicle crosses. */
 export class Kerbs {
-  /** @type {RoadIndex|null} */
-  #roads = null;
-  /** @type {{t: number, wheels: Point[]}|null} */
-  #last = null;
+  #roads: RoadIndex | null = null;
+  #last: { t: number; wheels: Point[] } | null = null;
 
-  /** @param {Pick<Scene, 'lanelets'>} scene */
-  constructor({ lanelets }) {
+  constructor({ lanelets }: Pick<Scene, 'lanelets'>) {
     if (lanelets.some((lanelet) => kerbsOf(lanelet).length > 0)) {
       this.#roads = new RoadIndex(lanelets);
     }
@@ -42,12 +38,11 @@ export class Kerbs {
   /**
    * Return the strongest kerb that the wheels have crossed since the last call.
    *
-   * @param {SceneVehicle} vehicle
-   * @param {Shown} shown current rows
-   * @param {number} index of the vehicle
-   * @returns {number} how hard it is, 0 to 1; 0 for no kerb
+   * @param shown current rows
+   * @param index of the vehicle
+   * @returns how hard it is, 0 to 1; 0 for no kerb
    */
-  over(vehicle, { t, vehicles }, index) {
+  over(vehicle: SceneVehicle, { t, vehicles }: Shown, index: number): number {
     if (this.#roads === null) {
       return 0;
     }
@@ -60,12 +55,8 @@ export class Kerbs {
       : Math.max(...wheels.map((to, i) => this.#crossed(before.wheels[i], to, most)));
   }
 
-  /**
-   * @param {Point} from
-   * @param {Point} to
-   * @param {number} most longest way; beyond it the vehicle was moved, not driven [m]
-   */
-  #crossed(from, to, most) {
+  /** @param most longest way; beyond it the vehicle was moved, not driven [m] */
+  #crossed(from: Point, to: Point, most: number) {
     const way = Math.hypot(to[0] - from[0], to[1] - from[1]);
     if (this.#roads === null || !(way > 0 && way <= most)) {
       return 0;
@@ -83,37 +74,31 @@ export class Kerbs {
   }
 }
 
-/** @param {Lanelet} lanelet */
-function kerbsOf({ left, left_line, right, right_line }) {
+function kerbsOf({ left, left_line, right, right_line }: Lanelet) {
   return [{ line: left, strength: STRENGTH[left_line] ?? 0 },
     { line: right, strength: STRENGTH[right_line] ?? 0 }].filter(({ strength }) => strength > 0);
 }
 
 /**
- * @param {SceneVehicle} vehicle
- * @param {Float64Array} rows
- * @param {number} at where its row begins
- * @returns {Point[]} where its four wheels stand
+ * @param at where its row begins
+ * @returns where its four wheels stand
  */
-function wheelsOf({ shape, wheelbase }, rows, at) {
+function wheelsOf({ shape, wheelbase }: SceneVehicle, rows: Float64Array, at: number): Point[] {
   const [x, y, yaw] = [VEHICLE.x, VEHICLE.y, VEHICLE.yaw].map((column) => rows[at + column]);
   const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
   const aside = 0.5 * shape.width - TYRE_M;
   return [0, wheelbase].flatMap((ahead) => [aside, -aside].map((left) => (
-    /** @type {Point} */ ([x + ahead * cos - left * sin, y + ahead * sin + left * cos]))));
+    [x + ahead * cos - left * sin, y + ahead * sin + left * cos])));
 }
 
 /**
  * Return whether a way crosses a line.
  *
- * @param {number[]} line flat
- * @param {Point} from
- * @param {Point} to
+ * @param line flat
  */
-function crosses(line, from, to) {
+function crosses(line: number[], from: Point, to: Point) {
   for (let i = 0; i + 3 < line.length; i += 2) {
-    /** @type {[Point, Point]} */
-    const [one, two] = [[line[i], line[i + 1]], [line[i + 2], line[i + 3]]];
+    const [one, two]: [Point, Point] = [[line[i], line[i + 1]], [line[i + 2], line[i + 3]]];
     if (isLeft(from, to, one) !== isLeft(from, to, two)
         && isLeft(one, two, from) !== isLeft(one, two, to)) {
       return true;
@@ -122,11 +107,6 @@ function crosses(line, from, to) {
   return false;
 }
 
-/**
- * @param {Point} from
- * @param {Point} to
- * @param {Point} point
- */
-function isLeft(from, to, point) {
+function isLeft(from: Point, to: Point, point: Point) {
   return (to[0] - from[0]) * (point[1] - from[1]) > (to[1] - from[1]) * (point[0] - from[0]);
 }

@@ -10,7 +10,7 @@
 
 import { speedShare } from './drive_train.js';
 
-/** @import { DriveTrain } from './drive_train.js' */
+import type { DriveTrain } from './drive_train.js';
 
 const TYRES = { amplitude: 0.07, at: 30, exponent: 1.75 };
 const WIND = { amplitude: 0.06, at: 40, exponent: 3 };
@@ -25,13 +25,11 @@ const SCREECH_FULL = 9;
 const CREEP = 2;
 
 /**
- * @param {DriveTrain} train
- * @param {number} rpm of the engine
- * @param {number} load 0 to 1
- * @returns {number} amplitude of an engine in its vehicle; of a motor 0 at standstill, of a rider
- *   always
+ * @param rpm of the engine
+ * @param load 0 to 1
+ * @returns amplitude of an engine in its vehicle; of a motor 0 at standstill, of a rider always
  */
-export function engineLevel(train, rpm, load) {
+export function engineLevel(train: DriveTrain, rpm: number, load: number): number {
   const share = speedShare(train, rpm);
   return train.name === 'muscle' ? 0 : train.name === 'electric'
     ? 0.09 * Math.min(rpm / 400, 1) * (0.3 + 0.7 * load) * (0.5 + 0.5 * share)
@@ -39,69 +37,68 @@ export function engineLevel(train, rpm, load) {
 }
 
 /**
- * @param {number} speed without a sign [m/s]
- * @returns {number} amplitude of rolling tyres
+ * @param speed without a sign [m/s]
+ * @returns amplitude of rolling tyres
  */
-export function tyreLevel(speed) {
+export function tyreLevel(speed: number): number {
   return TYRES.amplitude * (speed / TYRES.at) ** TYRES.exponent;
 }
 
 /**
- * @param {number} speed without a sign [m/s]
- * @returns {number} amplitude of wind
+ * @param speed without a sign [m/s]
+ * @returns amplitude of wind
  */
-export function windLevel(speed) {
+export function windLevel(speed: number): number {
   return Math.min(WIND.amplitude * (speed / WIND.at) ** WIND.exponent, LOUDEST_WIND);
 }
 
 /**
- * @param {number} deceleration against the motion [m/s^2]
- * @param {number} speed without a sign [m/s]
- * @returns {number} 0 to 1
+ * @param deceleration against the motion [m/s^2]
+ * @param speed without a sign [m/s]
+ * @returns 0 to 1
  */
-export function hardBraking(deceleration, speed) {
+export function hardBraking(deceleration: number, speed: number): number {
   return smooth(deceleration, SQUEAL_FROM, SQUEAL_FULL) * smooth(speed, 0, CREEP);
 }
 
 /**
- * @param {number} lateral acceleration [m/s^2]
- * @param {number} speed without a sign [m/s]
- * @returns {number} 0 to 1
+ * @param lateral acceleration [m/s^2]
+ * @param speed without a sign [m/s]
+ * @returns 0 to 1
  */
-export function cornering(lateral, speed) {
+export function cornering(lateral: number, speed: number): number {
   return smooth(Math.abs(lateral), SCREECH_FROM, SCREECH_FULL) * smooth(speed, 0, CREEP);
 }
 
 /**
- * @param {number} speed without a sign [m/s]
- * @returns {number} roughness of the ground beside the road, 0 to 1
+ * @param speed without a sign [m/s]
+ * @returns roughness of the ground beside the road, 0 to 1
  */
-export function roughness(speed) {
+export function roughness(speed: number): number {
   return smooth(speed, 0, 15);
 }
 
 /**
- * @param {number} speed without a sign [m/s]
- * @returns {number} strength of a collision, 0 to 1
+ * @param speed without a sign [m/s]
+ * @returns strength of a collision, 0 to 1
  */
-export function impact(speed) {
+export function impact(speed: number): number {
   return 0.35 + 0.65 * smooth(speed, 0, 15);
 }
 
 /**
- * @param {number} volume as people set it, 0 to 1
- * @returns {number} gain: perceived loudness is closer to the square root of amplitude
+ * @param volume as people set it, 0 to 1
+ * @returns gain: perceived loudness is closer to the square root of amplitude
  */
-export function volumeGain(volume) {
+export function volumeGain(volume: number): number {
   return volume * volume;
 }
 
 /**
- * @param {number} value
- * @param {number} from below it the result is 0
- * @param {number} to above it the result is 1
+ * @param from below it the result is 0
+ * @param to above it the result is 1
  */
-function smooth(value, from, to) {
+function smooth(value: number, from: number, to: number) {
   const share = Math.min(Math.max((value - from) / (to - from), 0), 1);
   return share * share * (3 - 2 * share);
 }

@@ -8,10 +8,10 @@ import {
 } from './drive_train.js';
 import { arrival, RANGE_M } from './hearing.js';
 
-/** @import { Scene, SceneObject, SceneVehicle } from '../messages.js' */
-/** @import { Shown } from '../store.js' */
-/** @import { DriveTrain } from './drive_train.js' */
-/** @import { Arrival, Moving } from './hearing.js' */
+import type { Scene, SceneObject, SceneVehicle } from '../messages.js';
+import type { Shown } from '../store.js';
+import type { DriveTrain } from './drive_train.js';
+import type { Arrival, Moving } from './hearing.js';
 
 /** Most others that are heard at once, the nearest. */
 export const MOST_OTHERS = 6;
@@ -24,35 +24,38 @@ const HOLDING = 0.15;
 const HELD_FROM = 5;
 const THROTTLE_PER_ACCELERATION = 0.25;
 // CommonRoad's types other than cars; null has no engine.
-/** @type {Record<string, DriveTrain|null|undefined>} */
-const TYPES = {
+const TYPES: Record<string, DriveTrain | null | undefined> = {
   truck: HEAVY, bus: HEAVY, bicycle: null, pedestrian: null, parkedVehicle: null, train: null,
   constructionZone: null, roadBoundary: null, building: null, pillar: null, median_strip: null,
 };
 
-/**
- * @typedef {object} Driven the own vehicle
- * @property {string} id
- * @property {DriveTrain} train
- * @property {number} gear index of a ratio, or REVERSE
- * @property {number} rpm
- * @property {number} load of the engine, 0 to 1
- * @property {number} speed without a sign [m/s]
- * @property {number} deceleration against the motion [m/s^2]
- * @property {number} lateral acceleration, to the left [m/s^2]
- * @property {number} lights bits of LIGHT
- */
+/** The own vehicle. */
+export interface Driven {
+  id: string;
+  train: DriveTrain;
+  gear: number; // index of a ratio, or REVERSE
+  rpm: number;
+  load: number; // of the engine, 0 to 1
+  speed: number; // without a sign [m/s]
+  deceleration: number; // against the motion [m/s^2]
+  lateral: number; // acceleration, to the left [m/s^2]
+  lights: number; // bits of LIGHT
+}
 
-/**
- * @typedef {Arrival & {id: string, train: DriveTrain, rpm: number, speed: number,
- *   lights: number}} Other a vehicle nearby
- * @typedef {{t: number, own: Driven, others: Other[]}} Heard
- */
+/** A vehicle nearby. */
+export interface Other extends Arrival {
+  id: string;
+  train: DriveTrain;
+  rpm: number;
+  speed: number;
+  lights: number;
+}
+
+export interface Heard { t: number; own: Driven; others: Other[] }
 
 /** The listener in one vehicle, which keeps the gears of all. */
 export class Listener {
-  /** @type {Map<string, number>} */
-  #gears = new Map();
+  #gears = new Map<string, number>();
 
   /** Clear the gears before another run. */
   reset() {
@@ -62,12 +65,11 @@ export class Listener {
   /**
    * Return the sounds that are heard.
    *
-   * @param {Scene} scene
-   * @param {Shown} shown rows of the same time
-   * @param {string} id of the vehicle or object whose driver listens
-   * @returns {Heard|null} null if there is no such vehicle now
+   * @param shown rows of the same time
+   * @param id of the vehicle or object whose driver listens
+   * @returns null if there is no such vehicle now
    */
-  hear(scene, { t, vehicles, objects }, id) {
+  hear(scene: Scene, { t, vehicles, objects }: Shown, id: string): Heard | null {
     const index = scene.vehicles.findIndex((vehicle) => vehicle.id === id);
     const column = index < 0 ? scene.objects.findIndex((object) => object.id === id) : -1;
     if (index < 0 && column < 0) {
@@ -83,13 +85,7 @@ export class Listener {
     return { t, own, others: this.#others(scene, vehicles, objects, id, ear) };
   }
 
-  /**
-   * @param {SceneVehicle} vehicle
-   * @param {Float64Array} rows
-   * @param {number} index
-   * @returns {Driven|null}
-   */
-  #driven(vehicle, rows, index) {
+  #driven(vehicle: SceneVehicle, rows: Float64Array, index: number): Driven | null {
     const at = index * VEHICLE_WIDTH;
     const signed = rows[at + VEHICLE.speed];
     if (!Number.isFinite(signed)) {
@@ -108,13 +104,8 @@ export class Listener {
     };
   }
 
-  /**
-   * @param {SceneObject} object
-   * @param {Float64Array} rows
-   * @param {number} column
-   * @returns {Driven|null} null for an object without a driver's seat
-   */
-  #passenger(object, rows, column) {
+  /** @returns null for an object without a driver's seat */
+  #passenger(object: SceneObject, rows: Float64Array, column: number): Driven | null {
     const train = trainOfObject(object);
     const { vx, vy } = objectAt(rows, column);
     const speed = Math.hypot(vx, vy);
@@ -125,30 +116,16 @@ export class Listener {
     };
   }
 
-  /**
-   * @param {string} id
-   * @param {DriveTrain} train
-   * @param {number} speed
-   * @param {number} throttle
-   * @param {boolean} reverse
-   */
-  #engine(id, train, speed, throttle, reverse) {
+  #engine(id: string, train: DriveTrain, speed: number, throttle: number, reverse: boolean) {
     const gear = reverse ? REVERSE : gearAfter(train, this.#gears.get(id) ?? 0, speed, throttle);
     this.#gears.set(id, gear);
     return { gear, rpm: engineSpeed_rpm(train, gear, speed, throttle) };
   }
 
-  /**
-   * @param {Scene} scene
-   * @param {Float64Array} vehicles
-   * @param {Float64Array} objects
-   * @param {string} id
-   * @param {Moving} ear
-   * @returns {Other[]} the nearest first
-   */
-  #others(scene, vehicles, objects, id, ear) {
-    /** @type {{id: string, train: DriveTrain, source: Moving, lights: number}[]} */
-    const all = [];
+  /** @returns the nearest first */
+  #others(scene: Scene, vehicles: Float64Array, objects: Float64Array, id: string,
+    ear: Moving): Other[] {
+    const all: { id: string; train: DriveTrain; source: Moving; lights: number }[] = [];
     scene.vehicles.forEach((vehicle, index) => {
       all.push({ id: vehicle.id, train: trainOf(vehicle),
         source: centreOf(vehicle, vehicles, index),
@@ -172,64 +149,44 @@ export class Listener {
   }
 }
 
-/**
- * @param {SceneVehicle} vehicle
- * @returns {DriveTrain}
- */
-function trainOf(vehicle) {
+function trainOf(vehicle: SceneVehicle): DriveTrain {
   return vehicle.powertrain === 'muscle' ? MUSCLE
     : vehicle.powertrain === 'electric' ? ELECTRIC
       : vehicle.shape.length > LONG_M ? HEAVY : CAR;
 }
 
-/**
- * @param {SceneObject} object
- * @returns {DriveTrain|null} null without an engine
- */
-function trainOfObject({ type, role, shape }) {
+/** @returns null without an engine */
+function trainOfObject({ type, role, shape }: SceneObject): DriveTrain | null {
   const known = TYPES[type];
   return role === 'static' || known === null ? null
     : known ?? (shape.length > LONG_M ? HEAVY : CAR);
 }
 
 /**
- * @param {number} speed without a sign [m/s]
- * @param {number} acceleration along the motion [m/s^2]
+ * @param speed without a sign [m/s]
+ * @param acceleration along the motion [m/s^2]
  */
-function guessThrottle(speed, acceleration) {
+function guessThrottle(speed: number, acceleration: number) {
   const holding = HOLDING * Math.min(speed / HELD_FROM, 1);
   return Math.min(Math.max(holding + THROTTLE_PER_ACCELERATION * acceleration, 0), 1);
 }
 
-/**
- * @param {SceneVehicle} vehicle
- * @param {Float64Array} rows
- * @param {number} index
- * @returns {Moving} the middle of its outline
- */
-function centreOf(vehicle, rows, index) {
+/** @returns the middle of its outline */
+function centreOf(vehicle: SceneVehicle, rows: Float64Array, index: number): Moving {
   return aheadOf(rows, index, vehicle.rear_to_center, 0);
 }
 
-/**
- * @param {SceneVehicle} vehicle
- * @param {Float64Array} rows
- * @param {number} index
- * @returns {Moving} its driver's head
- */
-function headOf(vehicle, rows, index) {
+/** @returns its driver's head */
+function headOf(vehicle: SceneVehicle, rows: Float64Array, index: number): Moving {
   const [ahead, left] = vehicle.driver_place.eye;
   return aheadOf(rows, index, ahead, left);
 }
 
 /**
- * @param {Float64Array} rows
- * @param {number} index
- * @param {number} ahead of the rear axle [m]
- * @param {number} left of it [m]
- * @returns {Moving}
+ * @param ahead of the rear axle [m]
+ * @param left of it [m]
  */
-function aheadOf(rows, index, ahead, left) {
+function aheadOf(rows: Float64Array, index: number, ahead: number, left: number): Moving {
   const at = index * VEHICLE_WIDTH;
   const [yaw, speed] = [rows[at + VEHICLE.yaw], rows[at + VEHICLE.speed]];
   const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
@@ -240,12 +197,7 @@ function aheadOf(rows, index, ahead, left) {
   };
 }
 
-/**
- * @param {Float64Array} rows
- * @param {number} column
- * @returns {Moving}
- */
-function objectAt(rows, column) {
+function objectAt(rows: Float64Array, column: number): Moving {
   const [x, y, yaw, vx, vy] = rows.subarray(column * OBJECT_WIDTH, (column + 1) * OBJECT_WIDTH);
   return { x, y, yaw, vx, vy };
 }

@@ -9,7 +9,7 @@ import { Horn } from './horn.js';
 import { engineLevel, tyreLevel } from './levels.js';
 import { engineWave, mainPartial, makeFilter, makeGain, playNoise, Value } from './voices.js';
 
-/** @import { Other } from './listener.js' */
+import type { Other } from './listener.js';
 
 // Factors outside against inside: tyres are louder and engines quieter.
 const TYRES = 14;
@@ -45,12 +45,10 @@ export class OtherVoice {
   #connected = false;
 
   /**
-   * @param {BaseAudioContext} context
-   * @param {AudioBuffer} noise
-   * @param {AudioNode} out node that it is connected to while it is in use
-   * @param {number} number of this voice
+   * @param out node that it is connected to while it is in use
+   * @param number of this voice
    */
-  constructor(context, noise, out, number) {
+  constructor(context: BaseAudioContext, noise: AudioBuffer, out: AudioNode, number: number) {
     this.#context = context;
     this.#out = out;
     this.#engine = context.createOscillator();
@@ -75,18 +73,15 @@ export class OtherVoice {
   }
 
   /**
-   * @param {number} when time of the context [s]
-   * @returns {boolean} whether it is free
+   * @param when time of the context [s]
+   * @returns whether it is free
    */
-  isFree(when) {
+  isFree(when: number): boolean {
     return this.id === '' && when >= this.#freeAt;
   }
 
-  /**
-   * @param {Other} other
-   * @param {number} when time of the context [s]
-   */
-  update({ id, train, rpm, speed, distance, pan, doppler, lights }, when) {
+  /** @param when time of the context [s] */
+  update({ id, train, rpm, speed, distance, pan, doppler, lights }: Other, when: number) {
     const frequency = doppler * tone_Hz(train, rpm) / mainPartial(train);
     if (id !== this.id) {
       this.id = id;
@@ -108,9 +103,9 @@ export class OtherVoice {
   /**
    * Fade out and free the voice.
    *
-   * @param {number} when time of the context [s]
+   * @param when time of the context [s]
    */
-  release(when) {
+  release(when: number) {
     if (this.id !== '') {
       this.id = '';
       this.#horn.update(false, 1, when);
@@ -123,13 +118,8 @@ export class OtherVoice {
     }
   }
 
-  /**
-   * @param {number} frequency [Hz]
-   * @param {number} doppler
-   * @param {number} pan
-   * @param {number} when
-   */
-  #begin(frequency, doppler, pan, when) {
+  /** @param frequency [Hz] */
+  #begin(frequency: number, doppler: number, pan: number, when: number) {
     if (!this.#connected) {
       this.#panner.connect(this.#out);
       this.#connected = true;

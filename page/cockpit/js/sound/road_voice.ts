@@ -5,22 +5,21 @@
 import { cornering, hardBraking, roughness, tyreLevel, windLevel } from './levels.js';
 import { makeFilter, makeGain, playNoise } from './voices.js';
 
-/** @import { Driven } from './listener.js' */
-/** @import { Value } from './voices.js' */
+import type { Driven } from './listener.js';
+import type { Value } from './voices.js';
 
-/**
- * One band of noise.
- *
- * @typedef {object} Band
- * @property {[type: BiquadFilterType, frequency: number, q?: number][]} filters one after another
- * @property {number} boost gain that compensates the power that the filters remove
- * @property {(own: Road) => number} level amplitude, 0 at standstill
- *
- * @typedef {Pick<Driven, 'speed'|'deceleration'|'lateral'> & {offRoad: boolean}} Road
- */
+// One band of noise.
+export interface Band {
+  filters: [type: BiquadFilterType, frequency: number, q?: number][]; // one after another
+  boost: number; // gain that compensates the power that the filters remove
+  level: (own: Road) => number; // amplitude, 0 at standstill
+}
 
-/** @type {Band[]} */
-const BANDS = [
+export interface Road extends Pick<Driven, 'speed' | 'deceleration' | 'lateral'> {
+  offRoad: boolean;
+}
+
+const BANDS: Band[] = [
   { filters: [['highpass', 70], ['lowpass', 420], ['lowpass', 700]], boost: 8,
     level: ({ speed }) => tyreLevel(speed) },
   { filters: [['highpass', 500], ['lowpass', 1800]], boost: 4,
@@ -40,20 +39,14 @@ const BANDS = [
 /** Noise in bands, at `output`. */
 export class RoadVoice {
   output;
-  /** @type {{gain: Value, band: Band}[]} */
-  #bands;
+  #bands: { gain: Value; band: Band }[];
 
-  /**
-   * @param {BaseAudioContext} context
-   * @param {AudioBuffer} noise
-   */
-  constructor(context, noise) {
+  constructor(context: BaseAudioContext, noise: AudioBuffer) {
     this.output = context.createGain();
     const source = playNoise(context, noise);
     this.#bands = BANDS.map((band) => {
       const { node, gain } = makeGain(context);
-      /** @type {AudioNode} */
-      let last = source;
+      let last: AudioNode = source;
       for (const [type, frequency, q] of band.filters) {
         last = last.connect(makeFilter(context, type, frequency, q));
       }
@@ -62,11 +55,8 @@ export class RoadVoice {
     });
   }
 
-  /**
-   * @param {Road} own
-   * @param {number} when time of the context [s]
-   */
-  update(own, when) {
+  /** @param when time of the context [s] */
+  update(own: Road, when: number) {
     for (const { gain, band } of this.#bands) {
       gain.to(band.boost * band.level(own), when);
     }

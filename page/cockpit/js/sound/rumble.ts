@@ -4,8 +4,8 @@
 
 import { hardBraking, impact, roughness } from './levels.js';
 
-/** @import { Driven } from './listener.js' */
-/** @import { Trouble } from './sound_graph.js' */
+import type { Driven } from './listener.js';
+import type { Trouble } from './sound_graph.js';
 
 // An effect lasts longer than the time to the next, so that the motors run evenly [ms].
 const EVERY_MS = 80;
@@ -13,17 +13,13 @@ const EFFECT_MS = 160;
 const KERB_MS = 150;
 const COLLISION_MS = 450;
 
-/**
- * @typedef {{strong: number, weak: number}} Magnitudes of the two motors, 0 to 1
- * @typedef {{magnitude: number, until_ms: number}} Pulse
- */
+export interface Magnitudes { strong: number; weak: number } // of the two motors, 0 to 1
+export interface Pulse { magnitude: number; until_ms: number }
 
 /** A converter of the own vehicle's state into magnitudes of the motors. */
 export class Feeling {
-  /** @type {Trouble|null} */
-  #trouble = null;
-  /** @type {Pulse} */
-  #pulse = { magnitude: 0, until_ms: -Infinity };
+  #trouble: Trouble | null = null;
+  #pulse: Pulse = { magnitude: 0, until_ms: -Infinity };
   #beat = false;
 
   /** Clear the past, which is not felt later. */
@@ -32,13 +28,8 @@ export class Feeling {
     this.#pulse = { magnitude: 0, until_ms: -Infinity };
   }
 
-  /**
-   * @param {Pick<Driven, 'speed'|'deceleration'>} own
-   * @param {Trouble} trouble
-   * @param {number} now_ms
-   * @returns {Magnitudes}
-   */
-  of({ speed, deceleration }, trouble, now_ms) {
+  of({ speed, deceleration }: Pick<Driven, 'speed' | 'deceleration'>, trouble: Trouble,
+    now_ms: number): Magnitudes {
     const before = this.#trouble ?? trouble;
     this.#trouble = trouble;
     if (trouble.collision && !before.collision) {
@@ -62,8 +53,7 @@ export class Feeling {
 /** The motors of one gamepad after another. */
 export class Rumble {
   #feeling = new Feeling();
-  /** @type {GamepadHapticActuator|null} */
-  #running = null;
+  #running: GamepadHapticActuator | null = null;
   #next_ms = -Infinity;
   // Strongest kerb between two effects.
   #kerb = 0;
@@ -71,13 +61,10 @@ export class Rumble {
   /**
    * Play the effects on a gamepad.
    *
-   * @param {GamepadHapticActuator} actuator
-   * @param {Pick<Driven, 'speed'|'deceleration'>} own
-   * @param {Trouble} trouble
-   * @param {number} strength 0 to 1
-   * @param {number} now_ms
+   * @param strength 0 to 1
    */
-  feel(actuator, own, trouble, strength, now_ms) {
+  feel(actuator: GamepadHapticActuator, own: Pick<Driven, 'speed' | 'deceleration'>,
+    trouble: Trouble, strength: number, now_ms: number) {
     if (this.#running !== null && this.#running !== actuator) {
       this.stop();
     }
@@ -114,11 +101,8 @@ export class Rumble {
   }
 }
 
-/**
- * @param {Gamepad|undefined} pad
- * @returns {GamepadHapticActuator|null} null if the gamepad or the browser has none
- */
-export function actuatorOf(pad) {
+/** @returns null if the gamepad or the browser has none */
+export function actuatorOf(pad: Gamepad | undefined): GamepadHapticActuator | null {
   const actuator = pad?.vibrationActuator ?? null;
   return typeof actuator?.playEffect === 'function' ? actuator : null;
 }

@@ -11,9 +11,9 @@ import { actuatorOf, Rumble } from './rumble.js';
 import { createSoundControl } from './sound_control.js';
 import { Speaker } from './speaker.js';
 
-/** @import { Connection } from '../connection.js' */
-/** @import { Store } from '../store.js' */
-/** @import { Heard } from './listener.js' */
+import type { Connection } from '../connection.js';
+import type { Store } from '../store.js';
+import type { Heard } from './listener.js';
 
 // Interval of updates: sound does not need every frame of the picture [ms].
 const EVERY_MS = 30;
@@ -25,7 +25,7 @@ const RUMBLE = 0.5;
 // A longer step of time between two updates is a jump [s].
 const JUMP_S = 0.5;
 
-/** @typedef {'volume'|'rumble'} Amount both from 0 to 1 */
+export type Amount = 'volume' | 'rumble'; // both from 0 to 1
 
 /** The page's sound; in `window.crgame.sound`. */
 export class Sound {
@@ -33,18 +33,13 @@ export class Sound {
   wanted = recall('sound') === 'on';
   volume = recallShare('volume', VOLUME);
   rumble = recallShare('rumble', RUMBLE);
-  /**
-   * The sounds heard now; null in silence.
-   *
-   * @type {Heard|null}
-   */
-  heard = null;
+  /** The sounds heard now; null in silence. */
+  heard: Heard | null = null;
 
   #store;
   #connection;
   #listener = new Listener();
-  /** @type {Kerbs|null} */
-  #kerbs = null;
+  #kerbs: Kerbs | null = null;
   #speaker = new Speaker(() => this.#sendSettings());
   #motors = new Rumble();
   #control;
@@ -55,12 +50,7 @@ export class Sound {
   // Whether the key M turns it on and off.
   #keys = true;
 
-  /**
-   * @param {HTMLElement} root
-   * @param {Store} store
-   * @param {Connection} connection
-   */
-  constructor(root, store, connection) {
+  constructor(root: HTMLElement, store: Store, connection: Connection) {
     this.#store = store;
     this.#connection = connection;
     this.#control = createSoundControl(root, this);
@@ -79,8 +69,7 @@ export class Sound {
       this.#sentSettings = '';
       this.#sendSettings();
     });
-    /** @param {number} now_ms */
-    const frame = (now_ms) => {
+    const frame = (now_ms: number) => {
       requestAnimationFrame(frame);
       if (now_ms >= this.#next_ms) {
         this.#next_ms = now_ms + EVERY_MS;
@@ -127,26 +116,22 @@ export class Sound {
   /**
    * Choose for this page only: the browser does not remember it, and M has no effect.
    *
-   * @param {boolean} on starts with the next key, click or button of a gamepad
+   * @param on starts with the next key, click or button of a gamepad
    */
-  want(on) {
+  want(on: boolean) {
     this.wanted = on;
     this.#keys = false;
     this.#sendSettings();
   }
 
-  /**
-   * @param {Amount} amount
-   * @param {number} share 0 to 1
-   */
-  set(amount, share) {
+  /** @param share 0 to 1 */
+  set(amount: Amount, share: number) {
     this[amount] = Math.min(Math.max(share, 0), 1);
     remember(amount, String(this[amount]));
     this.#sendSettings();
   }
 
-  /** @param {KeyboardEvent} event */
-  #key(event) {
+  #key(event: KeyboardEvent) {
     const free = !event.repeat && !event.ctrlKey && !event.metaKey && !event.altKey
       && !isTyping(event.target) && !document.querySelector('dialog[open]');
     if (event.code === KEY && free && this.#keys && this.allowed) {
@@ -157,12 +142,8 @@ export class Sound {
     }
   }
 
-  /**
-   * Update sound and rumble to the current state.
-   *
-   * @param {number} now_ms
-   */
-  #update(now_ms) {
+  /** Update sound and rumble to the current state. */
+  #update(now_ms: number) {
     if (!this.on && this.#pads().some(({ buttons }) => buttons.some(({ pressed }) => pressed))) {
       // Browsers treat a gamepad's button as a gesture, without an event.
       this.begin();
@@ -210,8 +191,7 @@ export class Sound {
     return driving !== undefined && driving.seat !== null && driving.away === null;
   }
 
-  /** @param {number} now_ms */
-  #hear(now_ms) {
+  #hear(now_ms: number) {
     const { scene } = this.#store;
     const shown = this.#store.displayed(now_ms);
     const id = window.crgame.driving?.seat ?? window.crgame.world.followed;
@@ -219,21 +199,15 @@ export class Sound {
       : this.#listener.hear(scene, shown, id);
   }
 
-  /** @param {Heard} heard */
-  #jumped({ t, own }) {
+  #jumped({ t, own }: Heard) {
     const jumped = own.id !== this.#subject || !(Math.abs(t - this.#t) < JUMP_S);
     this.#subject = own.id;
     this.#t = t;
     return jumped;
   }
 
-  /**
-   * @param {string} id
-   * @param {number} now_ms
-   * @param {boolean} jumped
-   * @returns {number} strength of the kerb crossed since the last update, 0 to 1
-   */
-  #kerb(id, now_ms, jumped) {
+  /** @returns strength of the kerb crossed since the last update, 0 to 1 */
+  #kerb(id: string, now_ms: number, jumped: boolean): number {
     const { scene } = this.#store;
     const index = this.#store.vehicleIndex(id);
     const shown = this.#store.displayed(now_ms);
@@ -247,8 +221,7 @@ export class Sound {
     return this.#kerbs.over(scene.vehicles[index], shown, index);
   }
 
-  /** @param {string} id */
-  #verdictOn(id) {
+  #verdictOn(id: string) {
     const verdict = this.#store.status?.drivability?.[id];
     return { collision: verdict?.collision ?? false, offRoad: verdict?.off_road ?? false };
   }
@@ -270,11 +243,8 @@ export class Sound {
   }
 }
 
-/**
- * @param {Amount} amount
- * @param {number} usual value if none was saved
- */
-function recallShare(amount, usual) {
+/** @param usual value if none was saved */
+function recallShare(amount: Amount, usual: number) {
   const kept = Number.parseFloat(recall(amount));
   return kept >= 0 && kept <= 1 ? kept : usual;
 }
@@ -282,11 +252,8 @@ function recallShare(amount, usual) {
 /**
  * Put the sound's control into the header, and start the sound.
  *
- * @param {HTMLElement} root of the control
- * @param {Store} store
- * @param {Connection} connection
- * @returns {Sound}
+ * @param root of the control
  */
-export function createSound(root, store, connection) {
+export function createSound(root: HTMLElement, store: Store, connection: Connection): Sound {
   return new Sound(root, store, connection);
 }

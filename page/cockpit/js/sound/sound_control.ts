@@ -5,16 +5,15 @@
 import { element, setAttribute, setText } from '../dom.js';
 import { icon } from '../panels/icons.js';
 
-/** @import { Amount, Sound } from './sound.js' */
+import type { Amount, Sound } from './sound.js';
 
 /**
  * Make the control.
  *
- * @param {HTMLElement} root of the button
- * @param {Sound} sound
- * @returns {{show: () => void}} show: updates the control
+ * @param root of the button
+ * @returns show: updates the control
  */
-export function createSoundControl(root, sound) {
+export function createSoundControl(root: HTMLElement, sound: Sound): { show: () => void } {
   const button = element('button', {
     type: 'button', id: 'sound', class: 'icon-button', popovertarget: 'sound-panel',
     'aria-keyshortcuts': 'M',
@@ -52,8 +51,7 @@ export function createSoundControl(root, sound) {
   return { show };
 }
 
-/** @param {Sound} sound */
-function stateOf({ allowed, wanted, on }) {
+function stateOf({ allowed, wanted, on }: Sound) {
   if (!allowed) {
     return { icon: 'sound_off', title: 'Sound: this game has none',
       note: 'This game is played without sound and rumble.' };
@@ -69,12 +67,8 @@ function stateOf({ allowed, wanted, on }) {
       note: 'Browsers let a page sound only after a click or a key.' };
 }
 
-/**
- * @param {Sound} sound
- * @param {Amount} amount
- * @param {string} name readable name
- */
-function slider(sound, amount, name) {
+/** @param name readable name */
+function slider(sound: Sound, amount: Amount, name: string) {
   const text = element('span');
   const input = element('input', { type: 'range', min: 0, max: 100, step: 5 });
   const show = () => {

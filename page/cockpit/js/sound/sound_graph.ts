@@ -17,7 +17,7 @@ import { RoadVoice } from './road_voice.js';
 import { Strikes } from './strikes.js';
 import { makeNoise } from './voices.js';
 
-/** @import { Heard, Other } from './listener.js' */
+import type { Heard, Other } from './listener.js';
 
 const THRESHOLD_dB = -8;
 const RATIO = 12;
@@ -27,11 +27,8 @@ const KNEE = 0.8;
 const CEILING = 0.98;
 const FADE_S = 0.04;
 
-/**
- * State of the own vehicle; kerb: strength of a kerb just crossed, 0 to 1.
- *
- * @typedef {{collision: boolean, offRoad: boolean, kerb: number}} Trouble
- */
+/** State of the own vehicle; kerb: strength of a kerb just crossed, 0 to 1. */
+export interface Trouble { collision: boolean; offRoad: boolean; kerb: number }
 
 /** The graph; silent until `open`. */
 export class SoundGraph {
@@ -43,13 +40,11 @@ export class SoundGraph {
   #horn;
   #strikes;
   #others;
-  /** @type {Trouble|null} */
-  #trouble = null;
+  #trouble: Trouble | null = null;
   #lit = false;
   #fading = { from: 0, to: 0, at: 0 };
 
-  /** @param {BaseAudioContext} context */
-  constructor(context) {
+  constructor(context: BaseAudioContext) {
     this.#context = context;
     const noise = makeNoise(context);
     // Always two channels, so that a passing vehicle does not change the channel count.
@@ -70,20 +65,20 @@ export class SoundGraph {
   /**
    * Fade in.
    *
-   * @param {number} gain 0 to 1
-   * @param {number} when time of the context [s]
+   * @param gain 0 to 1
+   * @param when time of the context [s]
    */
-  open(gain, when) {
+  open(gain: number, when: number) {
     this.#fade(gain, when);
   }
 
   /**
    * Fade to silence, which is exact after a moment.
    *
-   * @param {number} when time of the context [s]
-   * @returns {number} time from which it is silent [s]
+   * @param when time of the context [s]
+   * @returns time from which it is silent [s]
    */
-  hush(when) {
+  hush(when: number): number {
     this.#fade(0, when);
     // Events during the silence are dropped.
     this.#trouble = null;
@@ -94,11 +89,9 @@ export class SoundGraph {
   /**
    * Set the sounds from a time on.
    *
-   * @param {Heard} heard
-   * @param {Trouble} trouble
-   * @param {number} when time of the context [s]
+   * @param when time of the context [s]
    */
-  update({ t, own, others }, trouble, when) {
+  update({ t, own, others }: Heard, trouble: Trouble, when: number) {
     this.#engine.update(own, when);
     this.#road.update({ ...own, offRoad: trouble.offRoad }, when);
     this.#horn.update((own.lights & LIGHT.horn) !== 0, 1, when);
@@ -107,12 +100,8 @@ export class SoundGraph {
     this.#lend(others, when);
   }
 
-  /**
-   * @param {number} lights
-   * @param {number} t simulation time [s]
-   * @param {number} when
-   */
-  #blink(lights, t, when) {
+  /** @param t simulation time [s] */
+  #blink(lights: number, t: number, when: number) {
     const { left, right } = shining(lights, t);
     if ((left || right) !== this.#lit) {
       this.#lit = left || right;
@@ -120,12 +109,8 @@ export class SoundGraph {
     }
   }
 
-  /**
-   * @param {Trouble} trouble
-   * @param {number} speed [m/s]
-   * @param {number} when
-   */
-  #strike(trouble, speed, when) {
+  /** @param speed [m/s] */
+  #strike(trouble: Trouble, speed: number, when: number) {
     const before = this.#trouble ?? trouble;
     const edge = trouble.offRoad !== before.offRoad ? 1 : trouble.kerb;
     if (edge > 0) {
@@ -137,11 +122,7 @@ export class SoundGraph {
     this.#trouble = trouble;
   }
 
-  /**
-   * @param {Other[]} others
-   * @param {number} when
-   */
-  #lend(others, when) {
+  #lend(others: Other[], when: number) {
     const near = new Set(others.map(({ id }) => id));
     for (const voice of this.#others) {
       if (!near.has(voice.id)) {
@@ -155,11 +136,7 @@ export class SoundGraph {
     }
   }
 
-  /**
-   * @param {number} gain
-   * @param {number} when
-   */
-  #fade(gain, when) {
+  #fade(gain: number, when: number) {
     const { gain: param } = this.#gate;
     const { from, to, at } = this.#fading;
     const now = from + (to - from) * Math.min(Math.max((when - at) / FADE_S, 0), 1);
@@ -169,8 +146,8 @@ export class SoundGraph {
     param.linearRampToValueAtTime(gain, when + FADE_S);
   }
 
-  /** @returns {AudioNode} nodes that limit the mix to a safe level */
-  #limit() {
+  /** @returns nodes that limit the mix to a safe level */
+  #limit(): AudioNode {
     const context = this.#context;
     const compressor = new DynamicsCompressorNode(context, {
       threshold: THRESHOLD_dB, knee: 0, ratio: RATIO, attack: 0.002, release: 0.2,
@@ -186,10 +163,8 @@ export class SoundGraph {
   }
 }
 
-/**
- * @returns {Float32Array<ArrayBuffer>} of an odd number of points, so that silence stays silence
- */
-function clipCurve() {
+/** @returns of an odd number of points, so that silence stays silence */
+function clipCurve(): Float32Array<ArrayBuffer> {
   const points = 4097;
   return Float32Array.from({ length: points }, (_, i) => {
     const x = CLIP_RANGE * (2 * i / (points - 1) - 1);

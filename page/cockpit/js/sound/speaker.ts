@@ -5,18 +5,16 @@
 import { volumeGain } from './levels.js';
 import { SoundGraph } from './sound_graph.js';
 
-/** @import { Heard } from './listener.js' */
-/** @import { Trouble } from './sound_graph.js' */
+import type { Heard } from './listener.js';
+import type { Trouble } from './sound_graph.js';
 
 // Length of silence after which the audio device is released [ms].
 const IDLE_MS = 1000;
 
 /** The player of the sounds. */
 export class Speaker {
-  /** @type {AudioContext|null} */
-  #context = null;
-  /** @type {SoundGraph|null} */
-  #graph = null;
+  #context: AudioContext | null = null;
+  #graph: SoundGraph | null = null;
   #gain = NaN;
   #quiet = true;
   // Whether this class, not the browser, has suspended the context.
@@ -24,8 +22,8 @@ export class Speaker {
   #idleTimer = 0;
   #changed;
 
-  /** @param {() => void} changed called when the browser allows or stops playing */
-  constructor(changed) {
+  /** @param changed called when the browser allows or stops playing */
+  constructor(changed: () => void) {
     this.#changed = changed;
   }
 
@@ -47,11 +45,9 @@ export class Speaker {
   /**
    * Play, from now on.
    *
-   * @param {Heard} heard
-   * @param {Trouble} trouble
-   * @param {number} volume 0 to 1
+   * @param volume 0 to 1
    */
-  play(heard, trouble, volume) {
+  play(heard: Heard, trouble: Trouble, volume: number) {
     if (this.#context === null || this.#graph === null) {
       return;
     }

@@ -15,12 +15,7 @@ export class Strikes {
   #noise;
   #out;
 
-  /**
-   * @param {BaseAudioContext} context
-   * @param {AudioBuffer} noise
-   * @param {AudioNode} out
-   */
-  constructor(context, noise, out) {
+  constructor(context: BaseAudioContext, noise: AudioBuffer, out: AudioNode) {
     this.#context = context;
     this.#noise = noise;
     this.#out = out;
@@ -29,20 +24,20 @@ export class Strikes {
   /**
    * Play the relay of an indicator.
    *
-   * @param {boolean} lit whether its lamps go on, which sounds higher
-   * @param {number} when time of the context [s]
+   * @param lit whether its lamps go on, which sounds higher
+   * @param when time of the context [s]
    */
-  click(lit, when) {
+  click(lit: boolean, when: number) {
     this.#burst(when, 0.5, 0.006, makeFilter(this.#context, 'bandpass', lit ? 2900 : 2200, 3));
   }
 
   /**
    * Play wheels that cross a kerb.
    *
-   * @param {number} strength 0 to 1
-   * @param {number} when time of the context [s]
+   * @param strength 0 to 1
+   * @param when time of the context [s]
    */
-  kerb(strength, when) {
+  kerb(strength: number, when: number) {
     this.#thump(when, 0.45 * strength, 0.05, 75);
     this.#burst(when, 0.25 * strength, 0.03, makeFilter(this.#context, 'lowpass', 700));
   }
@@ -50,22 +45,20 @@ export class Strikes {
   /**
    * Play a collision.
    *
-   * @param {number} strength 0 to 1
-   * @param {number} when time of the context [s]
+   * @param strength 0 to 1
+   * @param when time of the context [s]
    */
-  collision(strength, when) {
+  collision(strength: number, when: number) {
     this.#thump(when, 0.9 * strength, 0.12, 55);
     this.#burst(when, 1.2 * strength, 0.09, makeFilter(this.#context, 'lowpass', 1500));
     this.#burst(when + 0.03, 0.4 * strength, 0.22, makeFilter(this.#context, 'bandpass', 3200, 2));
   }
 
   /**
-   * @param {number} when [s]
-   * @param {number} amplitude
-   * @param {number} decay_s time constant [s]
-   * @param {BiquadFilterNode} filter
+   * @param when [s]
+   * @param decay_s time constant [s]
    */
-  #burst(when, amplitude, decay_s, filter) {
+  #burst(when: number, amplitude: number, decay_s: number, filter: BiquadFilterNode) {
     const source = this.#context.createBufferSource();
     source.buffer = this.#noise;
     source.connect(filter).connect(this.#envelope(source, when, amplitude, decay_s));
@@ -74,12 +67,11 @@ export class Strikes {
   }
 
   /**
-   * @param {number} when [s]
-   * @param {number} amplitude
-   * @param {number} decay_s time constant [s]
-   * @param {number} frequency at which it begins, and falls [Hz]
+   * @param when [s]
+   * @param decay_s time constant [s]
+   * @param frequency at which it begins, and falls [Hz]
    */
-  #thump(when, amplitude, decay_s, frequency) {
+  #thump(when: number, amplitude: number, decay_s: number, frequency: number) {
     const source = this.#context.createOscillator();
     source.frequency.setValueAtTime(frequency, when);
     source.frequency.setTargetAtTime(0.5 * frequency, when, decay_s);
@@ -89,13 +81,11 @@ export class Strikes {
   }
 
   /**
-   * @param {AudioScheduledSourceNode} source stopped at its end
-   * @param {number} when [s]
-   * @param {number} amplitude
-   * @param {number} decay_s
-   * @returns {GainNode}
+   * @param source stopped at its end
+   * @param when [s]
    */
-  #envelope(source, when, amplitude, decay_s) {
+  #envelope(source: AudioScheduledSourceNode, when: number, amplitude: number,
+    decay_s: number): GainNode {
     const level = this.#context.createGain();
     level.gain.setValueAtTime(0, when);
     level.gain.linearRampToValueAtTime(amplitude, when + ATTACK_S);

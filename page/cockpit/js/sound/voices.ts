@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Building blocks of voices: smooth values, noise, waves. */
 
-/** @import { DriveTrain } from './drive_train.js' */
+import type { DriveTrain } from './drive_train.js';
 
 // Time constant of a voice's values: it avoids clicks and audible lag [s].
 const SETTLE_S = 0.025;
@@ -17,12 +17,8 @@ export class Value {
   #settle_s;
   #last;
 
-  /**
-   * @param {AudioParam} param
-   * @param {number} initial
-   * @param {number} [settle_s] time constant [s]
-   */
-  constructor(param, initial, settle_s = SETTLE_S) {
+  /** @param settle_s time constant [s] */
+  constructor(param: AudioParam, initial: number, settle_s = SETTLE_S) {
     this.#param = param;
     this.#settle_s = settle_s;
     this.#last = initial;
@@ -32,10 +28,9 @@ export class Value {
   /**
    * Move to a value from a time on.
    *
-   * @param {number} value
-   * @param {number} when time of the context [s]
+   * @param when time of the context [s]
    */
-  to(value, when) {
+  to(value: number, when: number) {
     if (Math.abs(value - this.#last) > SAME * Math.abs(this.#last)) {
       this.#param.setTargetAtTime(value, when, this.#settle_s);
       this.#last = value;
@@ -45,36 +40,25 @@ export class Value {
   /**
    * Jump to a value, for a voice that is silent.
    *
-   * @param {number} value
-   * @param {number} when time of the context [s]
+   * @param when time of the context [s]
    */
-  jump(value, when) {
+  jump(value: number, when: number) {
     this.#param.cancelScheduledValues(when);
     this.#param.setValueAtTime(value, when);
     this.#last = value;
   }
 }
 
-/**
- * Make a gain that begins at an amplitude and moves smoothly.
- *
- * @param {BaseAudioContext} context
- * @param {number} [amplitude]
- * @returns {{node: GainNode, gain: Value}}
- */
-export function makeGain(context, amplitude = 0) {
+/** Make a gain that begins at an amplitude and moves smoothly. */
+export function makeGain(context: BaseAudioContext,
+  amplitude = 0): { node: GainNode; gain: Value } {
   const node = context.createGain();
   return { node, gain: new Value(node.gain, amplitude) };
 }
 
-/**
- * @param {BaseAudioContext} context
- * @param {BiquadFilterType} type
- * @param {number} frequency [Hz]
- * @param {number} [q]
- * @returns {BiquadFilterNode}
- */
-export function makeFilter(context, type, frequency, q = Math.SQRT1_2) {
+/** @param frequency [Hz] */
+export function makeFilter(context: BaseAudioContext, type: BiquadFilterType, frequency: number,
+  q = Math.SQRT1_2): BiquadFilterNode {
   const filter = context.createBiquadFilter();
   filter.type = type;
   filter.frequency.value = frequency;
@@ -82,13 +66,8 @@ export function makeFilter(context, type, frequency, q = Math.SQRT1_2) {
   return filter;
 }
 
-/**
- * Make some seconds of white noise, the same every time, of variance 1/3.
- *
- * @param {BaseAudioContext} context
- * @returns {AudioBuffer}
- */
-export function makeNoise(context) {
+/** Make some seconds of white noise, the same every time, of variance 1/3. */
+export function makeNoise(context: BaseAudioContext): AudioBuffer {
   const buffer = context.createBuffer(1, NOISE_S * context.sampleRate, context.sampleRate);
   const samples = buffer.getChannelData(0);
   // A linear congruential generator (Numerical Recipes): only its upper bits are used.
@@ -103,12 +82,10 @@ export function makeNoise(context) {
 /**
  * Play noise without end.
  *
- * @param {BaseAudioContext} context
- * @param {AudioBuffer} noise
- * @param {number} [offset_s] start in the noise: two players of one noise must differ
- * @returns {AudioBufferSourceNode}
+ * @param offset_s start in the noise: two players of one noise must differ
  */
-export function playNoise(context, noise, offset_s = 0) {
+export function playNoise(context: BaseAudioContext, noise: AudioBuffer,
+  offset_s = 0): AudioBufferSourceNode {
   const source = context.createBufferSource();
   source.buffer = noise;
   source.loop = true;
@@ -120,22 +97,20 @@ export function playNoise(context, noise, offset_s = 0) {
  * Return the partial of an engine's wave that is its strongest tone: a four-stroke engine repeats
  * every two turns, a motor with every pulse.
  *
- * @param {DriveTrain} train
- * @returns {number} number of the partial
+ * @returns number of the partial
  */
-export function mainPartial(train) {
+export function mainPartial(train: DriveTrain): number {
   return train.name === 'electric' ? 1 : 2 * train.order;
 }
 
 /**
  * Make the wave of an engine: the strongest tone and its multiples, weaker ones between them.
  *
- * @param {BaseAudioContext} context
- * @param {DriveTrain} train
- * @param {number} falling exponent with which the partials fall: less is harsher
- * @returns {PeriodicWave} of amplitude 1
+ * @param falling exponent with which the partials fall: less is harsher
+ * @returns of amplitude 1
  */
-export function engineWave(context, train, falling) {
+export function engineWave(context: BaseAudioContext, train: DriveTrain,
+  falling: number): PeriodicWave {
   const main = mainPartial(train);
   const real = new Float32Array(PARTIALS + 1);
   const imag = new Float32Array(PARTIALS + 1);

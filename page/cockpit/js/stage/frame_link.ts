@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The link between a stage and the page that frames it: one origin, set by the server. */
 
-/** @import { StageOrder, StageState } from './stage_messages.js' */
-/** @import { Store } from '../store.js' */
+import type { StageOrder, StageState } from './stage_messages.js';
+import type { Store } from '../store.js';
 
 /** The sender and receiver of messages to the framing page. */
 export class FrameLink {
@@ -11,10 +11,10 @@ export class FrameLink {
   #told = '';
 
   /**
-   * @param {Store} store whose `framedBy` is the origin
-   * @param {(order: StageOrder) => void} ordered called for each order of that page
+   * @param store whose `framedBy` is the origin
+   * @param ordered called for each order of that page
    */
-  constructor(store, ordered) {
+  constructor(store: Store, ordered: (order: StageOrder) => void) {
     this.#store = store;
     window.addEventListener('message', ({ source, origin, data }) => {
       if (source === window.parent && window.parent !== window && origin !== ''
@@ -24,12 +24,8 @@ export class FrameLink {
     });
   }
 
-  /**
-   * Send the state if it has changed.
-   *
-   * @param {StageState} state
-   */
-  send(state) {
+  /** Send the state if it has changed. */
+  send(state: StageState) {
     const { framedBy } = this.#store;
     const text = JSON.stringify(state);
     if (window.parent !== window && framedBy !== '' && text !== this.#told) {
@@ -39,15 +35,11 @@ export class FrameLink {
   }
 }
 
-/**
- * @param {unknown} data
- * @returns {data is StageOrder}
- */
-function isOrder(data) {
+function isOrder(data: unknown): data is StageOrder {
   if (typeof data !== 'object' || data === null) {
     return false;
   }
-  const { crgame, kind, ready, profiles } = /** @type {Record<string, unknown>} */ (data);
+  const { crgame, kind, ready, profiles } = data as Record<string, unknown>;
   return crgame === 1 && (kind === 'focus' || (kind === 'ready' && typeof ready === 'boolean')
     || (kind === 'calibrations' && typeof profiles === 'object' && profiles !== null));
 }

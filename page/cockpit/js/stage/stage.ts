@@ -8,11 +8,11 @@ import { FrameLink } from './frame_link.js';
 import { readStage } from './stage_address.js';
 import { WORDS } from './stage_words.js';
 
-/** @import { Connection } from '../connection.js' */
-/** @import { Store } from '../store.js' */
-/** @import { StageAddress } from './stage_address.js' */
-/** @import { StageOrder, StageState, StageView } from './stage_messages.js' */
-/** @import { StageTrouble } from './stage_words.js' */
+import type { Connection } from '../connection.js';
+import type { Store } from '../store.js';
+import type { StageAddress } from './stage_address.js';
+import type { StageOrder, StageState, StageView } from './stage_messages.js';
+import type { StageTrouble } from './stage_words.js';
 
 // Least interval of reports to the framing page [ms].
 const EVERY_MS = 100;
@@ -36,13 +36,8 @@ export class Stage {
   // Epoch for which the driver has reported ready.
   #ready = { wanted: false, epoch: -1, sent: false };
 
-  /**
-   * @param {HTMLElement} root gets the line
-   * @param {Store} store
-   * @param {Connection} connection
-   * @param {StageAddress} address
-   */
-  constructor(root, store, connection, address) {
+  /** @param root gets the line */
+  constructor(root: HTMLElement, store: Store, connection: Connection, address: StageAddress) {
     this.address = address;
     this.#store = store;
     this.#connection = connection;
@@ -86,7 +81,7 @@ export class Stage {
   }
 
   #writeLabels() {
-    for (const name of /** @type {const} */ (['throttle', 'brake'])) {
+    for (const name of ['throttle', 'brake'] as const) {
       const label = document.querySelector(`.pedal-${name} .bar-label`);
       if (label !== null) {
         setText(label, this.#words[name]);
@@ -104,8 +99,7 @@ export class Stage {
     }
   }
 
-  /** @param {StageOrder} order */
-  #obey(order) {
+  #obey(order: StageOrder) {
     if (order.kind === 'calibrations') {
       keepProfiles(order.profiles);
       window.crgame.driving?.gamepads.reload();
@@ -206,8 +200,8 @@ export class Stage {
     return this.#has && this.#isAutonomous && this.#store.status?.n === 0;
   }
 
-  /** @returns {StageTrouble|null} the reason why the driver cannot drive, null for none */
-  #trouble() {
+  /** @returns the reason why the driver cannot drive, null for none */
+  #trouble(): StageTrouble | null {
     const { connected, mode, status, scene, seats, me } = this.#store;
     const { seat } = this.address;
     const { driving } = window.crgame;
@@ -236,11 +230,7 @@ export class Stage {
       : status?.seats_lost?.[seat] && status.run === 'running' ? 'silent' : null;
   }
 
-  /**
-   * @param {StageTrouble|null} trouble
-   * @returns {StageState}
-   */
-  #state(trouble) {
+  #state(trouble: StageTrouble | null): StageState {
     const { connected, status, epoch, seats, people, me, round_trip_ms } = this.#store;
     const { driving } = window.crgame;
     const { seat } = this.address;
@@ -261,21 +251,19 @@ export class Stage {
     };
   }
 
-  /** @returns {number|null} time of the shown picture [s] */
-  get #time_s() {
+  /** @returns time of the shown picture [s] */
+  get #time_s(): number | null {
     const { view3d, world } = window.crgame;
     const t = view3d?.on ? view3d.stats?.t : world.shown?.t;
     return t === undefined || !Number.isFinite(t) ? null : Math.round(1000 * t) / 1000;
   }
 
-  /** @returns {StageView} */
-  get #view() {
+  get #view(): StageView {
     const { view3d } = window.crgame;
     return view3d?.on ? view3d.viewpoint : 'map';
   }
 
-  /** @returns {StageState['sound']} */
-  get #sound() {
+  get #sound(): StageState['sound'] {
     const { sound } = window.crgame;
     return sound === undefined || !sound.wanted ? 'off' : !sound.allowed ? 'none'
       : sound.on ? 'on' : 'waits';
@@ -285,13 +273,9 @@ export class Stage {
 /**
  * Make the page a stage.
  *
- * @param {HTMLElement} root
- * @param {Store} store
- * @param {Connection} connection
- * @returns {Stage}
  * @throws {Error} if the address is not one of a stage
  */
-export function createStage(root, store, connection) {
+export function createStage(root: HTMLElement, store: Store, connection: Connection): Stage {
   const address = readStage(window.location.search);
   if (address === null) {
     throw new Error('the address names no seat');

@@ -5,44 +5,44 @@
  * docs/stage.md describes them for authors of such a page.
  */
 
-export {};
+import type { RunState } from '../messages.js';
+import type { Viewpoint } from '../view3d/cameras.js';
 
-/** @import { RunState } from '../messages.js' */
-/** @import { Viewpoint } from '../view3d/cameras.js' */
+export type StageView = Viewpoint | 'map';
 
-/** @typedef {Viewpoint|'map'} StageView */
+/** The state that the stage reports. */
+export interface StageState {
+  seat: string; // in the address
+  seated: boolean; // whether this page holds it
+  rides: boolean; // whether the vehicle is an AV that its planner drives
+  connected: boolean; // to the simulation
+  run: RunState | null; // null before the first report
+  reason: string; // why the run ended; empty before
+  epoch: number; // counts resets; -1 before the first state
+  time_s: number | null; // the run's clock, of the picture that is shown
+  ready: boolean; // whether the simulation counts the driver as ready
+  countdown_s: number; // until the run begins; 0 for none
+  view: StageView; // what is shown
+  missing3d: boolean; // whether the map is shown because the 3D view is not available
+  // `waits` for a key, a click or a gamepad's button; `none` in the game
+  sound: 'on' | 'waits' | 'off' | 'none';
+  hasInput: boolean; // whether the driver's inputs act on the vehicle
+  away: string; // why they do not: focus, hidden, dialog, connection, unplugged
+  device: string; // the input device
+  delay_ms: number | null; // round-trip time to the server
+  input_delay_ms: number | null; // from an input to the visible answer, at the page
+  trouble: string; // why the driver cannot drive, in English; empty for no trouble
+}
 
-/**
- * The state that the stage reports.
- *
- * @typedef {object} StageState
- * @property {string} seat in the address
- * @property {boolean} seated whether this page holds it
- * @property {boolean} rides whether the vehicle is an AV that its planner drives
- * @property {boolean} connected to the simulation
- * @property {RunState|null} run null before the first report
- * @property {string} reason why the run ended; empty before
- * @property {number} epoch counts resets; -1 before the first state
- * @property {number|null} time_s the run's clock, of the picture that is shown
- * @property {boolean} ready whether the simulation counts the driver as ready
- * @property {number} countdown_s until the run begins; 0 for none
- * @property {StageView} view what is shown
- * @property {boolean} missing3d whether the map is shown because the 3D view is not available
- * @property {'on'|'waits'|'off'|'none'} sound `waits` for a key, a click or a gamepad's button;
- *   `none` in the game
- * @property {boolean} hasInput whether the driver's inputs act on the vehicle
- * @property {string} away why they do not: focus, hidden, dialog, connection, unplugged
- * @property {string} device the input device
- * @property {number|null} delay_ms round-trip time to the server
- * @property {number|null} input_delay_ms from an input to the visible answer, at the page
- * @property {string} trouble why the driver cannot drive, in English; empty for no trouble
- */
+export interface StageTells { crgame: 1; kind: 'stage'; state: StageState } // to the framing page
+export interface ReadyOrder { crgame: 1; kind: 'ready'; ready: boolean } // from it
+export interface FocusOrder { crgame: 1; kind: 'focus' } // from it
 
-/**
- * @typedef {{crgame: 1, kind: 'stage', state: StageState}} StageTells to the framing page
- * @typedef {{crgame: 1, kind: 'ready', ready: boolean}} ReadyOrder from it
- * @typedef {{crgame: 1, kind: 'focus'}} FocusOrder from it
- * @typedef {{crgame: 1, kind: 'calibrations', profiles: Record<string, string>}
- *   } CalibrationsOrder from it: JSON of mappings of gamepads and wheels, by the device's name
- * @typedef {ReadyOrder|FocusOrder|CalibrationsOrder} StageOrder
- */
+/** From it: JSON of mappings of gamepads and wheels, by the device's name. */
+export interface CalibrationsOrder {
+  crgame: 1;
+  kind: 'calibrations';
+  profiles: Record<string, string>;
+}
+
+export type StageOrder = ReadyOrder | FocusOrder | CalibrationsOrder;

@@ -2,14 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Texts of a stage for its driver, in the language of the address. */
 
-/**
- * @typedef {'connecting'|'lost'|'focus'|'unplugged'|'silent'|'taken'|'no_seat'|'recording'
- *   |'failed'} StageTrouble
- * @typedef {StageTrouble|'throttle'|'brake'} StageWord
- */
+export type StageTrouble = 'connecting' | 'lost' | 'focus' | 'unplugged' | 'silent' | 'taken'
+  | 'no_seat' | 'recording' | 'failed';
+export type StageWord = StageTrouble | 'throttle' | 'brake';
 
-/** @type {Record<'en'|'de', Record<StageWord, string>>} */
-export const WORDS = Object.freeze({
+export const WORDS: Record<'en' | 'de', Record<StageWord, string>> = Object.freeze({
   en: {
     connecting: 'Connecting to the simulation.',
     lost: 'Connection lost: your vehicle brakes by itself.',

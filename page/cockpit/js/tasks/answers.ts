@@ -6,7 +6,7 @@ import { isTyping } from '../driving/focus.js';
 import { connectedPads } from '../driving/gamepad.js';
 import { LIGHT_BUTTONS } from '../lights.js';
 
-/** @import { Profile } from '../driving/gamepad_profile.js' */
+import type { Profile } from '../driving/gamepad_profile.js';
 
 export const ANSWER_KEY = 'Enter';
 // An older time stamp of a gamepad does not belong to the press just seen [ms].
@@ -15,11 +15,10 @@ const FRESH_MS = 200;
 /**
  * Return whether a button has another meaning.
  *
- * @param {Profile} profile of its device
- * @param {number} index of the button
- * @returns {boolean}
+ * @param profile of its device
+ * @param index of the button
  */
-export function isTaken(profile, index) {
+export function isTaken(profile: Profile, index: number): boolean {
   const { reverse, lights, put_back } = profile;
   return [reverse.on, reverse.off, reverse.toggle, reverse.held,
     put_back, ...LIGHT_BUTTONS.map((name) => lights[name])].some((list) => list.includes(index))
@@ -31,26 +30,21 @@ export function isTaken(profile, index) {
 export class Answers {
   #wanted;
   #take;
-  /** @type {Map<number, boolean[]>} */
-  #pressed = new Map();
+  #pressed = new Map<number, boolean[]>();
   #polling = false;
 
   /**
-   * @param {() => boolean} wanted returns whether an answer is accepted now
-   * @param {(at_ms: number) => void} take called with the time of an answer, by performance.now
+   * @param wanted returns whether an answer is accepted now
+   * @param take called with the time of an answer, by performance.now
    */
-  constructor(wanted, take) {
+  constructor(wanted: () => boolean, take: (at_ms: number) => void) {
     this.#wanted = wanted;
     this.#take = take;
     window.addEventListener('keydown', (event) => this.#key(event), true);
   }
 
-  /**
-   * Accept a touch or click on an element as an answer.
-   *
-   * @param {HTMLElement} node
-   */
-  touch(node) {
+  /** Accept a touch or click on an element as an answer. */
+  touch(node: HTMLElement) {
     node.addEventListener('pointerdown', (event) => {
       if (this.#wanted()) {
         event.preventDefault();
@@ -68,8 +62,7 @@ export class Answers {
     }
   }
 
-  /** @param {KeyboardEvent} event */
-  #key(event) {
+  #key(event: KeyboardEvent) {
     const free = !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping(event.target)
       && !document.querySelector('dialog[open]');
     if (event.key === ANSWER_KEY && free && this.#wanted()) {

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** One stimulus or request on this page: the times of its first picture and of its answer. */
 
-/** @import { GameTask, OpenPrompt, PageTimes } from './task_messages.js' */
-/** @import { RunningTime } from './running_time.js' */
+import type { GameTask, OpenPrompt, PageTimes } from './task_messages.js';
+import type { RunningTime } from './running_time.js';
 
 /** A prompt from its message to its end. All times are those of performance.now [ms]. */
 export class Prompt {
@@ -18,15 +18,15 @@ export class Prompt {
   #received_ms;
   #way_ms;
   #pausedBefore_ms = 0;
+  open;
+  task;
 
   /**
-   * @param {OpenPrompt} open
-   * @param {GameTask} task
-   * @param {RunningTime} running
-   * @param {number} received_ms when its message arrived
-   * @param {number} round_trip_ms round-trip time to the server; NaN if unknown
+   * @param received_ms when its message arrived
+   * @param round_trip_ms round-trip time to the server; NaN if unknown
    */
-  constructor(open, task, running, received_ms, round_trip_ms) {
+  constructor(open: OpenPrompt, task: GameTask, running: RunningTime, received_ms: number,
+    round_trip_ms: number) {
     this.open = open;
     this.task = task;
     this.#running = running;
@@ -34,51 +34,38 @@ export class Prompt {
     this.#way_ms = Number.isFinite(round_trip_ms) ? round_trip_ms / 2 : 0;
   }
 
-  /** @param {number} drawn_ms when its first picture was drawn */
-  draw(drawn_ms) {
+  /** @param drawn_ms when its first picture was drawn */
+  draw(drawn_ms: number) {
     this.drawn_ms = drawn_ms;
     this.#pausedBefore_ms = this.#running.paused(drawn_ms);
   }
 
-  /**
-   * @param {number} now_ms
-   * @returns {number} how long it has been visible, without pauses; NaN before it is drawn
-   */
-  since(now_ms) {
+  /** @returns how long it has been visible, without pauses; NaN before it is drawn */
+  since(now_ms: number): number {
     return now_ms - this.drawn_ms - this.#paused(now_ms);
   }
 
-  /**
-   * @param {number} now_ms
-   * @returns {boolean} whether its light is on
-   */
-  lit(now_ms) {
+  /** @returns whether its light is on */
+  lit(now_ms: number): boolean {
     return !this.answered && !this.#running.stands
       && this.since(now_ms) < 1000 * (this.task.shown_s ?? 0);
   }
 
-  /**
-   * @param {number} now_ms
-   * @returns {boolean} whether it accepts an answer
-   */
-  accepts(now_ms) {
+  /** @returns whether it accepts an answer */
+  accepts(now_ms: number): boolean {
     const since_ms = this.since(now_ms);
     return !this.answered && since_ms >= 0 && since_ms <= 1000 * (this.task.latest_s ?? 0);
   }
 
-  /**
-   * @param {number} [answer_ms] when it was answered
-   * @returns {PageTimes}
-   */
-  times(answer_ms) {
+  /** @param answer_ms when it was answered */
+  times(answer_ms?: number): PageTimes {
     const delay_ms = this.drawn_ms - this.#received_ms + this.#way_ms;
     const seen = { delay_ms, picture_ms: this.picture_ms };
     return answer_ms === undefined ? seen
       : { ...seen, response_ms: this.since(answer_ms), paused_ms: this.#paused(answer_ms) };
   }
 
-  /** @param {number} now_ms */
-  #paused(now_ms) {
+  #paused(now_ms: number) {
     return this.#running.paused(now_ms) - this.#pausedBefore_ms;
   }
 }
@@ -86,12 +73,11 @@ export class Prompt {
 /**
  * Apply a change just before a picture, and measure when that and the next one were drawn.
  *
- * @param {() => void} change changes the picture
- * @returns {Promise<{drawn_ms: number, picture_ms: number}>} when it was drawn (the browser runs
- *   a message that is sent in an animation frame after it has painted that frame), and the time
- *   from the beginning of this frame to that of the next
+ * @param change changes the picture
+ * @returns when it was drawn (the browser runs a message that is sent in an animation frame after
+ *   it has painted that frame), and the time from the beginning of this frame to that of the next
  */
-export function inPicture(change) {
+export function inPicture(change: () => void): Promise<{ drawn_ms: number; picture_ms: number }> {
   return new Promise((resolve) => {
     requestAnimationFrame((frame_ms) => {
       change();

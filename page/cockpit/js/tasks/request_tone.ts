@@ -13,10 +13,8 @@ const LOUDEST = 0.4;
 
 /** The tone of a request; browsers allow it after a first gesture on the page. */
 export class RequestTone {
-  /** @type {AudioContext|null} */
-  #context = null;
-  /** @type {OscillatorNode[]} */
-  #sounding = [];
+  #context: AudioContext | null = null;
+  #sounding: OscillatorNode[] = [];
 
   constructor() {
     const begin = () => {
@@ -36,8 +34,8 @@ export class RequestTone {
     return this.#sounding.length > 0;
   }
 
-  /** @param {number} volume 0 to 1 */
-  play(volume) {
+  /** @param volume 0 to 1 */
+  play(volume: number) {
     this.stop();
     const context = this.#context;
     if (context === null || volume <= 0) {
@@ -61,12 +59,10 @@ export class RequestTone {
   }
 
   /**
-   * @param {AudioContext} context
-   * @param {number} pitch [Hz]
-   * @param {number} at time of the context [s]
-   * @param {number} gain
+   * @param pitch [Hz]
+   * @param at time of the context [s]
    */
-  #beep(context, pitch, at, gain) {
+  #beep(context: AudioContext, pitch: number, at: number, gain: number) {
     const tone = new OscillatorNode(context, { type: 'triangle', frequency: pitch });
     const level = new GainNode(context, { gain: 0 });
     level.gain.setValueAtTime(0, at);

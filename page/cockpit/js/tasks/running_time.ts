@@ -15,10 +15,9 @@ export class RunningTime {
   /**
    * Record whether the run is running.
    *
-   * @param {boolean} runs
-   * @param {number} now_ms from performance.now
+   * @param now_ms from performance.now
    */
-  note(runs, now_ms) {
+  note(runs: boolean, now_ms: number) {
     if (runs && this.stands) {
       this.#paused_ms += now_ms - this.#since_ms;
       this.#since_ms = NaN;
@@ -28,10 +27,10 @@ export class RunningTime {
   }
 
   /**
-   * @param {number} now_ms from performance.now
-   * @returns {number} total pause since the page was loaded [ms]
+   * @param now_ms from performance.now
+   * @returns total pause since the page was loaded [ms]
    */
-  paused(now_ms) {
+  paused(now_ms: number): number {
     return this.#paused_ms + (this.stands ? Math.max(now_ms - this.#since_ms, 0) : 0);
   }
 }

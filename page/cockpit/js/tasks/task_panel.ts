@@ -7,9 +7,9 @@ import { fixed, oneLine } from '../panels/format.js';
 import { icon } from '../panels/icons.js';
 import { reasonAgainst } from '../rights.js';
 
-/** @import { Connection } from '../connection.js' */
-/** @import { Store } from '../store.js' */
-/** @import { GameTask } from './task_messages.js' */
+import type { Connection } from '../connection.js';
+import type { Store } from '../store.js';
+import type { GameTask } from './task_messages.js';
 
 const KINDS = { detection_response: 'Detection response', take_over: 'Take-over request',
   secondary_task: 'Secondary task' };
@@ -17,17 +17,14 @@ const KINDS = { detection_response: 'Detection response', take_over: 'Take-over 
 /**
  * Create the panel; without tasks there is none.
  *
- * @param {HTMLElement} root #panel-events
- * @param {Store} store
- * @param {Connection} connection
+ * @param root #panel-events
  */
-export function createTaskPanel(root, store, connection) {
+export function createTaskPanel(root: HTMLElement, store: Store, connection: Connection) {
   const list = element('ul', { class: 'event-list' });
   const box = element('section', { class: 'task-panel', hidden: true },
     element('h2', { text: 'Tasks' }), list);
   root.append(box);
-  /** @type {Map<string, ReturnType<typeof makeCard>>} */
-  const cards = new Map();
+  const cards = new Map<string, ReturnType<typeof makeCard>>();
 
   const update = () => {
     const can = store.mode === 'live' && store.connected && store.status?.run !== 'ended'
@@ -46,8 +43,7 @@ export function createTaskPanel(root, store, connection) {
     box.hidden = cards.size === 0;
     update();
   };
-  /** @param {string} name */
-  const press = async (name) => {
+  const press = async (name: string) => {
     const reply = await connection.request({ type: 'trigger', event: name });
     cards.get(name)?.refused(reply.ok ? '' : oneLine(reply.text));
   };
@@ -66,11 +62,7 @@ export function createTaskPanel(root, store, connection) {
   rebuild();
 }
 
-/**
- * @param {GameTask} task
- * @param {() => void} press
- */
-function makeCard(task, press) {
+function makeCard(task: GameTask, press: () => void) {
   const label = oneLine(task.label || task.name);
   const button = element('button', { type: 'button', class: 'primary', on: { click: press } });
   const state = element('p', { class: 'event-state' });
@@ -83,14 +75,9 @@ function makeCard(task, press) {
         element('div', {}, element('h3', { text: label }),
           element('span', { class: 'tag', text: KINDS[task.kind] })), button),
       element('p', { class: 'dim', text: `For the driver of ${task.seat}${lead}` }), state, error),
-    /** @param {string} text */
-    refused: (text) => setText(error, text),
-    /**
-     * @param {Store} store
-     * @param {boolean} can
-     * @param {string} reason why it cannot be pressed, or empty
-     */
-    update(store, can, reason) {
+    refused: (text: string) => setText(error, text),
+    /** @param reason why it cannot be pressed, or empty */
+    update(store: Store, can: boolean, reason: string) {
       const lasts = store.tasks.running.includes(task.name);
       const open = store.tasks.open.find((prompt) => prompt.task === task.name);
       button.disabled = !can || (asks && open !== undefined);

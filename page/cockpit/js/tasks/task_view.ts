@@ -4,7 +4,7 @@
 
 import { element, setText, svg } from '../dom.js';
 
-/** @import { Words } from './task_words.js' */
+import type { Words } from './task_words.js';
 
 // A steering wheel with two hands, 24 × 24.
 const WHEEL = 'M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18m0 2.2a6.8 6.8 0 0 1 6.7 5.6h-4.2a2.8 2.8 0 0 0'
@@ -13,8 +13,19 @@ const WHEEL = 'M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18m0 2.2a6.8 6.8 0 0 1 6.7 5.6h-
 
 /** The driver's view of tasks, without any logic. */
 export class TaskView {
-  /** @param {HTMLElement} stage that it covers */
-  constructor(stage) {
+  light;
+  title;
+  label;
+  hint;
+  takeButton;
+  request;
+  frame;
+  note;
+  answerButton;
+  root;
+
+  /** @param stage that it covers */
+  constructor(stage: HTMLElement) {
     this.light = element('div', { class: 'task-light', role: 'img', hidden: true });
     this.title = element('strong', { class: 'task-title' });
     this.label = element('span', { class: 'task-label' });
@@ -35,13 +46,8 @@ export class TaskView {
     stage.append(this.root);
   }
 
-  /**
-   * Write the constant texts.
-   *
-   * @param {Words} words
-   * @param {string} language
-   */
-  speak(words, language) {
+  /** Write the constant texts. */
+  speak(words: Words, language: string) {
     this.root.lang = language;
     this.light.setAttribute('aria-label', words.light);
     setText(this.answerButton, words.answer);
@@ -52,10 +58,9 @@ export class TaskView {
   /**
    * Show a request, or none.
    *
-   * @param {{label: string, hint: string, free: boolean}|null} request `free`: the
-   *   seat is free, so that it can be taken here
+   * @param request `free`: the seat is free, so that it can be taken here
    */
-  showRequest(request) {
+  showRequest(request: { label: string; hint: string; free: boolean } | null) {
     this.request.hidden = this.frame.hidden = request === null;
     if (request !== null) {
       setText(this.label, request.label);
@@ -65,8 +70,8 @@ export class TaskView {
     }
   }
 
-  /** @param {string} text of the active secondary tasks; empty for none */
-  showNote(text) {
+  /** @param text of the active secondary tasks; empty for none */
+  showNote(text: string) {
     setText(this.note, text);
     this.note.hidden = text === '';
   }

@@ -13,28 +13,23 @@ const WORDS = {
   },
 };
 
-/** @typedef {keyof typeof WORDS} Language */
-/** @typedef {typeof WORDS['en']} Words */
+export type Language = keyof typeof WORDS;
+export type Words = typeof WORDS['en'];
 
 /**
  * Choose the language of a page.
  *
- * @param {string} search query of the address, whose `lang` may name a language
- * @param {string|undefined} ofGame language of the game
- * @returns {Language}
+ * @param search query of the address, whose `lang` may name a language
+ * @param ofGame language of the game
  */
-export function languageOf(search, ofGame) {
-  const known = /** @type {Language[]} */ (Object.keys(WORDS));
+export function languageOf(search: string, ofGame: string | undefined): Language {
+  const known = Object.keys(WORDS) as Language[];
   const wanted = [new URLSearchParams(search).get('lang'), ofGame]
     .map((name) => String(name ?? '').toLowerCase().split('-')[0]);
   return wanted.map((name) => known.find((code) => code === name))
     .find((code) => code !== undefined) ?? 'en';
 }
 
-/**
- * @param {Language} language
- * @returns {Words}
- */
-export function wordsIn(language) {
+export function wordsIn(language: Language): Words {
   return WORDS[language];
 }

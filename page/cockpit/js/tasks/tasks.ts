@@ -9,9 +9,9 @@ import { RunningTime } from './running_time.js';
 import { languageOf, wordsIn } from './task_words.js';
 import { TaskView } from './task_view.js';
 
-/** @import { Connection } from '../connection.js' */
-/** @import { Store } from '../store.js' */
-/** @import { GameTask, OpenPrompt, PageTimes } from './task_messages.js' */
+import type { Connection } from '../connection.js';
+import type { Store } from '../store.js';
+import type { GameTask, OpenPrompt, PageTimes } from './task_messages.js';
 
 /** The tasks of a page; in `window.crgame.tasks`. */
 export class Tasks {
@@ -21,21 +21,12 @@ export class Tasks {
   #tone = new RequestTone();
   #view;
   #answers;
-  /**
-   * The open prompts of this page, by task and number.
-   *
-   * @type {Map<string, Prompt>}
-   */
-  #prompts = new Map();
+  /** The open prompts of this page, by task and number. */
+  #prompts = new Map<string, Prompt>();
   #words = wordsIn('en');
   #frameRequested = false;
 
-  /**
-   * @param {HTMLElement} stage
-   * @param {Store} store
-   * @param {Connection} connection
-   */
-  constructor(stage, store, connection) {
+  constructor(stage: HTMLElement, store: Store, connection: Connection) {
     this.#store = store;
     this.#connection = connection;
     this.#view = new TaskView(stage);
@@ -55,8 +46,8 @@ export class Tasks {
     this.#begin();
   }
 
-  /** @returns {Prompt[]} the open prompts */
-  get prompts() {
+  /** @returns the open prompts */
+  get prompts(): Prompt[] {
     return [...this.#prompts.values()];
   }
 
@@ -69,15 +60,15 @@ export class Tasks {
     return this.#runs && (this.#detecting !== undefined || this.#request?.free === true);
   }
 
-  /** @returns {GameTask[]} the tasks of the game for this page's driver */
-  get #mine() {
+  /** @returns the tasks of the game for this page's driver */
+  get #mine(): GameTask[] {
     const { mode, scene, seats, me } = this.#store;
     return mode !== 'live' || me.id === '' ? []
       : (scene?.tasks ?? []).filter(({ seat }) => seats[seat]?.holder === me.id);
   }
 
-  /** @returns {GameTask|undefined} this driver's active detection task */
-  get #detecting() {
+  /** @returns this driver's active detection task */
+  get #detecting(): GameTask | undefined {
     const { running } = this.#store.tasks;
     return this.#mine.find(({ name, kind }) => kind === 'detection_response'
       && running.includes(name));
@@ -92,10 +83,8 @@ export class Tasks {
   /**
    * Return whether the person may take a seat. A request of an AV goes to every page that does not
    * drive.
-   *
-   * @param {string} seat
    */
-  #mayTake(seat) {
+  #mayTake(seat: string) {
     const { seats, me, rights } = this.#store;
     const sits = Object.values(seats).some(({ holder }) => holder === me.id);
     return !sits && rights.drives && me.id !== '' && seats[seat] !== undefined
@@ -122,8 +111,7 @@ export class Tasks {
     const mine = this.#mine;
     const tasks = this.#store.mode === 'live' ? this.#store.scene?.tasks ?? [] : [];
     const open = this.#store.connected ? this.#store.tasks.open : [];
-    /** @type {Set<string>} */
-    const kept = new Set();
+    const kept = new Set<string>();
     for (const each of open) {
       const task = tasks.find(({ name }) => name === each.task);
       if (task && (mine.includes(task)
@@ -144,13 +132,7 @@ export class Tasks {
     this.#requestFrame();
   }
 
-  /**
-   * @param {string} key
-   * @param {OpenPrompt} open
-   * @param {GameTask} task
-   * @param {number} now_ms
-   */
-  #open(key, open, task, now_ms) {
+  #open(key: string, open: OpenPrompt, task: GameTask, now_ms: number) {
     const prompt = new Prompt(open, task, this.#running, now_ms, this.#store.round_trip_ms);
     this.#prompts.set(key, prompt);
     const light = task.kind === 'detection_response';
@@ -173,8 +155,7 @@ export class Tasks {
     }
   }
 
-  /** @param {GameTask[]} mine */
-  #showWhatLasts(mine) {
+  #showWhatLasts(mine: GameTask[]) {
     const { running } = this.#store.tasks;
     const shown = this.#store.connected ? mine.filter(({ name, kind, show }) => show
       && kind === 'secondary_task' && running.includes(name)) : [];
@@ -221,8 +202,8 @@ export class Tasks {
     });
   }
 
-  /** @param {number} at_ms time of the answer */
-  #answer(at_ms) {
+  /** @param at_ms time of the answer */
+  #answer(at_ms: number) {
     const request = this.#request;
     if (request?.free) {
       this.#takeOver();
@@ -249,12 +230,7 @@ export class Tasks {
     }
   }
 
-  /**
-   * @param {Prompt} prompt
-   * @param {'shown'|'answer'} what
-   * @param {PageTimes} times
-   */
-  #send({ open }, what, times) {
+  #send({ open }: Prompt, what: 'shown' | 'answer', times: PageTimes) {
     const known = Object.fromEntries(Object.entries(times)
       .filter(([, value]) => Number.isFinite(value))
       .map(([name, value]) => [name, Math.round(1000 * value) / 1000]));
@@ -266,11 +242,8 @@ export class Tasks {
 /**
  * Show the tasks of the game to the driver at this page.
  *
- * @param {HTMLElement} root `#stage`
- * @param {Store} store
- * @param {Connection} connection
- * @returns {Tasks}
+ * @param root `#stage`
  */
-export function createTasks(root, store, connection) {
+export function createTasks(root: HTMLElement, store: Store, connection: Connection): Tasks {
   return new Tasks(root, store, connection);
 }

@@ -5,26 +5,22 @@
 import { MeshBuilder } from './bodies/mesh_builder.js';
 import { geometryOf } from './instances.js';
 
-/** @import { Mesh } from 'three' */
-/** @import { SceneVehicle } from '../messages.js' */
-/** @import { Point, Tint } from './bodies/mesh_builder.js' */
-/** @import { Three } from './road/road_world.js' */
+import type { Mesh } from 'three';
+import type { SceneVehicle } from '../messages.js';
+import type { Point, Tint } from './bodies/mesh_builder.js';
+import type { Three } from './three.js';
 
-/** @type {Tint} */
-const INSIDE = [0.035, 0.037, 0.042];
-/** @type {Tint} */
-const DASH = [0.025, 0.026, 0.03];
+const INSIDE: Tint = [0.035, 0.037, 0.042];
+const DASH: Tint = [0.025, 0.026, 0.03];
 const PILLAR_M = 0.05;
 
 /**
  * Make the inside of a vehicle, relative to its rear axle on the road.
  *
- * @param {Three} three
- * @param {SceneVehicle} vehicle
- * @param {number} paint its colour
- * @returns {Mesh} seen from the driver's eye only
+ * @param paint its colour
+ * @returns seen from the driver's eye only
  */
-export function createCabin(three, vehicle, paint) {
+export function createCabin(three: Three, vehicle: SceneVehicle, paint: number): Mesh {
   const mesh = new MeshBuilder();
   const { red, green, blue } = rgbOf(three, paint);
   addBonnet(mesh, vehicle, [red, green, blue]);
@@ -37,45 +33,32 @@ export function createCabin(three, vehicle, paint) {
   return cabin;
 }
 
-/**
- * @param {Three} three
- * @param {number} paint
- */
-function rgbOf(three, paint) {
+function rgbOf(three: Three, paint: number) {
   const { r: red, g: green, b: blue } = new three.Color(paint);
   return { red, green, blue };
 }
 
-/**
- * A crowned sheet from the windscreen to the bumper, which sinks towards its front.
- *
- * @param {MeshBuilder} mesh
- * @param {SceneVehicle} vehicle
- * @param {Tint} tint
- */
-function addBonnet(mesh, { shape, rear_to_center: rear, driver_place: place }, tint) {
+/** A crowned sheet from the windscreen to the bumper, which sinks towards its front. */
+function addBonnet(mesh: MeshBuilder,
+  { shape, rear_to_center: rear, driver_place: place }: SceneVehicle, tint: Tint) {
   const front = rear + shape.length / 2;
   const screen = Math.min(place.left_mirror[0] + 0.05, front - 0.2);
   const half = shape.width / 2;
   const top = place.bonnet_height;
   const count = 6;
-  /** @type {Point[][]} */
-  const sections = Array.from({ length: count + 1 }, (_, i) => {
+  const sections: Point[][] = Array.from({ length: count + 1 }, (_, i) => {
     const share = i / count;
     const x = screen + share * (front - screen);
     const drop = 0.03 * share + 0.26 * share ** 2.2;
     const wide = half * (0.95 - 0.16 * share ** 2);
-    return [-1, -0.8, -0.4, 0, 0.4, 0.8, 1].map((side) => /** @type {Point} */ (
-      [x, side * wide, top - drop - 0.11 * side ** 4 - 0.012 * (1 - Math.abs(side))]));
+    return [-1, -0.8, -0.4, 0, 0.4, 0.8, 1].map((
+      side) => [x, side * wide, top - drop - 0.11 * side ** 4 - 0.012 * (1 - Math.abs(side))]);
   });
   mesh.skin(sections, () => tint);
 }
 
-/**
- * @param {MeshBuilder} mesh
- * @param {SceneVehicle} vehicle
- */
-function addFrame(mesh, { shape, rear_to_center: rear, driver_place: place }) {
+function addFrame(mesh: MeshBuilder,
+  { shape, rear_to_center: rear, driver_place: place }: SceneVehicle) {
   const half = shape.width / 2;
   const [eyeX, , eyeZ] = place.eye;
   const screen = Math.min(place.left_mirror[0] + 0.05, rear + shape.length / 2 - 0.2);
@@ -99,15 +82,11 @@ function addFrame(mesh, { shape, rear_to_center: rear, driver_place: place }) {
 /**
  * A straight bar from one point to another.
  *
- * @param {MeshBuilder} mesh
- * @param {Point} from
- * @param {Point} to
- * @param {number} width [m]
+ * @param width [m]
  */
-function bar(mesh, from, to, width) {
+function bar(mesh: MeshBuilder, from: Point, to: Point, width: number) {
   const w = width / 2;
-  /** @type {(point: Point) => Point[]} */
-  const section = ([x, y, z]) => [[x + w, y - w, z - w], [x + w, y + w, z - w],
+  const section = ([x, y, z]: Point): Point[] => [[x + w, y - w, z - w], [x + w, y + w, z - w],
     [x - w, y + w, z + w], [x - w, y - w, z + w]];
   const [low, high] = [section(from), section(to)];
   low.forEach((corner, i) => {

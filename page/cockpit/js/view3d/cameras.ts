@@ -10,37 +10,39 @@ const BIRD_ABOVE_M = 55;
 const BIRD_AHEAD_M = 12;
 
 /** The viewpoints. */
-export const VIEWPOINTS = /** @type {const} */ (['driver', 'chase', 'bird']);
+export const VIEWPOINTS = ['driver', 'chase', 'bird'] as const;
 
-/**
- * @typedef {typeof VIEWPOINTS[number]} Viewpoint
- * @typedef {{x: number, y: number, z: number}} Point [m]
- */
+export type Viewpoint = typeof VIEWPOINTS[number];
+export interface Point { x: number; y: number; z: number } // [m]
 
 /**
  * The pose of a vehicle: its rear axle on the road, its heading, and the road's upward slope.
  *
- * @typedef {Point & {yaw: number, slope: number}} Stand [m, rad]
+ * [m, rad].
  */
+export interface Stand extends Point { yaw: number; slope: number }
 
 /**
  * The pose of a camera. It is turned with the vehicle, by yaw and slope, then within it to the
  * left and upwards; never rolled.
  *
- * @typedef {Point & {yaw: number, slope: number, aside: number, pitch: number}} CameraPose
- *   [m, rad]
+ * [m, rad].
  */
+export interface CameraPose extends Point {
+  yaw: number;
+  slope: number;
+  aside: number;
+  pitch: number;
+}
 
 /**
  * Return a camera at a point of a vehicle.
  *
- * @param {Stand} stand
- * @param {Point} point ahead of the rear axle, to the left, above the road [m]
- * @param {number} [aside] how far it looks to the left of straight ahead [rad]
- * @param {number} [pitch] how far it looks upwards [rad]
- * @returns {CameraPose}
+ * @param point ahead of the rear axle, to the left, above the road [m]
+ * @param aside how far it looks to the left of straight ahead [rad]
+ * @param pitch how far it looks upwards [rad]
  */
-export function mountedAt(stand, point, aside = 0, pitch = 0) {
+export function mountedAt(stand: Stand, point: Point, aside = 0, pitch = 0): CameraPose {
   const { yaw, slope } = stand;
   // Distance ahead in the plane: on a climbing vehicle, higher points are farther back.
   const ahead = point.x * Math.cos(slope) - point.z * Math.sin(slope);
@@ -55,24 +57,18 @@ export function mountedAt(stand, point, aside = 0, pitch = 0) {
 /**
  * Return a camera behind and above a vehicle.
  *
- * @param {Stand} stand
- * @param {{front: number, rear: number}} ends of the vehicle ahead of its rear axle [m]
- * @param {number} [aside] how far it looks to the left of straight ahead [rad]
- * @returns {CameraPose}
+ * @param ends of the vehicle ahead of its rear axle [m]
+ * @param aside how far it looks to the left of straight ahead [rad]
  */
-export function chasing(stand, { rear }, aside = 0) {
+export function chasing(stand: Stand, { rear }: { front: number; rear: number },
+  aside = 0): CameraPose {
   const level = { ...stand, slope: 0.5 * stand.slope };
   return mountedAt(level, { x: rear - CHASE_BEHIND_M, y: 0, z: CHASE_ABOVE_M }, aside,
     CHASE_PITCH);
 }
 
-/**
- * Return a camera above a vehicle, which drives upwards in the picture.
- *
- * @param {Stand} stand
- * @returns {CameraPose}
- */
-export function above(stand) {
+/** Return a camera above a vehicle, which drives upwards in the picture. */
+export function above(stand: Stand): CameraPose {
   return mountedAt({ ...stand, slope: 0 }, { x: BIRD_AHEAD_M, y: 0, z: BIRD_ABOVE_M }, 0,
     -90 * DEGREE);
 }

@@ -11,41 +11,42 @@ const TALLEST = 95 * DEGREE;
 /**
  * The driver's screen and seat, with which things appear in their true size.
  *
- * @typedef {{screen_width_m: number, eye_distance_m: number}} Seat [m]
+ * [m].
  */
+export interface Seat { screen_width_m: number; eye_distance_m: number }
 
 /**
  * Return the vertical angle of a picture from its horizontal one.
  *
- * @param {number} across [rad]
- * @param {number} aspect width through height
- * @returns {number} [rad], limited in both directions
+ * @param across [rad]
+ * @param aspect width through height
+ * @returns [rad], limited in both directions
  */
-export function heightAngle(across, aspect) {
+export function heightAngle(across: number, aspect: number): number {
   return Math.min(2 * Math.atan(Math.tan(across / 2) / aspect), TALLEST);
 }
 
 /**
  * Return the angle under which the driver sees a picture that is centred in front.
  *
- * @param {Seat} seat
- * @param {number} share of the screen's width that the picture covers
- * @returns {number} across the picture [rad]
+ * @param share of the screen's width that the picture covers
+ * @returns across the picture [rad]
  */
-export function trueAngle({ screen_width_m, eye_distance_m }, share) {
+export function trueAngle({ screen_width_m, eye_distance_m }: Seat, share: number): number {
   return 2 * Math.atan((0.5 * screen_width_m * share) / eye_distance_m);
 }
 
 /**
  * Choose the angle across a picture.
  *
- * @param {Seat|null} seat null for the chosen angle
- * @param {number} chosen_deg across the picture [deg]
- * @param {number} width of the picture [CSS px]
- * @param {number} screenWidth of the screen [CSS px]
- * @returns {number} [rad]
+ * @param seat null for the chosen angle
+ * @param chosen_deg across the picture [deg]
+ * @param width of the picture [CSS px]
+ * @param screenWidth of the screen [CSS px]
+ * @returns [rad]
  */
-export function acrossAngle(seat, chosen_deg, width, screenWidth) {
+export function acrossAngle(seat: Seat | null, chosen_deg: number, width: number,
+  screenWidth: number): number {
   if (seat !== null) {
     return trueAngle(seat, width / screenWidth);
   }
@@ -56,11 +57,11 @@ export function acrossAngle(seat, chosen_deg, width, screenWidth) {
 /**
  * Read the entries about screen and seat.
  *
- * @param {string} width of the screen [cm]
- * @param {string} distance of the eyes from it [cm]
- * @returns {Seat|null} null if they are not valid
+ * @param width of the screen [cm]
+ * @param distance of the eyes from it [cm]
+ * @returns null if they are not valid
  */
-export function readSeat(width, distance) {
+export function readSeat(width: string, distance: string): Seat | null {
   const screen_width_m = Number(width) / 100;
   const eye_distance_m = Number(distance) / 100;
   return screen_width_m >= 0.05 && screen_width_m <= 20 && eye_distance_m >= 0.1

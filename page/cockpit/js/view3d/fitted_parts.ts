@@ -6,13 +6,13 @@ import { MeshBuilder } from './bodies/mesh_builder.js';
 import { Instances } from './instances.js';
 import { mergeable, SeenInstances } from './seen_instances.js';
 
-/** @import { Group, Matrix4, MeshBasicMaterial } from 'three' */
-/** @import { Body } from './bodies/motor_vehicles.js' */
-/** @import { Three } from './road/road_world.js' */
-/** @import { Part, Sight } from './seen_instances.js' */
+import type { Group, Matrix4, MeshBasicMaterial } from 'three';
+import type { Body } from './bodies/motor_vehicles.js';
+import type { Three } from './three.js';
+import type { Part, Sight } from './seen_instances.js';
 
-/** @typedef {[x: number, y: number, z: number]} Scale */
-/** @typedef {{brakes: boolean, left: boolean, right: boolean}} Lit */
+export type Scale = [x: number, y: number, z: number];
+export interface Lit { brakes: boolean; left: boolean; right: boolean }
 
 const BRAKE = 0xff2a16;
 const AMBER = 0xffa000;
@@ -30,25 +30,17 @@ const PLAIN_WHEELS_SOONER = 0.35;
 export class FittedParts {
   #three;
   #group;
-  /** @type {Instances|null} */
-  #wheels = null;
-  /** @type {SeenInstances|null} */
-  #lamps = null;
-  /** @type {SeenInstances|null} */
-  #shadows = null;
-  /** @type {MeshBasicMaterial[]} */
-  #materials = [];
+  #wheels: Instances | null = null;
+  #lamps: SeenInstances | null = null;
+  #shadows: SeenInstances | null = null;
+  #materials: MeshBasicMaterial[] = [];
   #color;
   #matrix;
   #step;
   #pitch;
   #vector;
 
-  /**
-   * @param {Three} three
-   * @param {Group} group
-   */
-  constructor(three, group) {
+  constructor(three: Three, group: Group) {
     this.#three = three;
     this.#group = group;
     this.#color = new three.Color();
@@ -58,8 +50,8 @@ export class FittedParts {
     this.#vector = new three.Vector3();
   }
 
-  /** @param {number} count of things that may have them */
-  load(count) {
+  /** @param count of things that may have them */
+  load(count: number) {
     this.dispose();
     const most = Math.max(PER_VEHICLE * count, 1);
     this.#wheels = new Instances(this.#three, this.#group, wheel(), most, plainWheel(),
@@ -67,7 +59,7 @@ export class FittedParts {
     const [lamp, shadow] = [lampPart(this.#three), shadowPart(this.#three)];
     const plain = [lamp, shadow].map(mergeable);
     this.#materials = [lamp, shadow, ...plain].map(
-      ({ material }) => /** @type {MeshBasicMaterial} */ (material));
+      ({ material }) => material as MeshBasicMaterial);
     this.#lamps = new SeenInstances(this.#three, { near: [lamp], far: [plain[0]], sooner: 0 },
       2 * most);
     this.#shadows = new SeenInstances(this.#three, { near: [shadow], far: [plain[1]], sooner: 0 },
@@ -84,8 +76,8 @@ export class FittedParts {
     }
   }
 
-  /** @param {Sight} sight of the camera that draws next */
-  see(sight) {
+  /** @param sight of the camera that draws next */
+  see(sight: Sight) {
     for (const parts of [this.#wheels, this.#lamps, this.#shadows]) {
       parts?.see(sight);
     }
@@ -104,22 +96,21 @@ export class FittedParts {
   }
 
   /**
-   * @param {number} slope upwards [rad]
-   * @returns {Matrix4} that pitches a level body; the same object each time
+   * @param slope upwards [rad]
+   * @returns that pitches a level body; the same object each time
    */
-  pitched(slope) {
+  pitched(slope: number): Matrix4 {
     return this.#pitch.makeRotationY(-slope);
   }
 
   /**
-   * @param {Matrix4} place of the vehicle's middle
-   * @param {NonNullable<Body['wheels']>} wheels
-   * @param {Scale} scale of the body
-   * @param {number} steering of the front wheels [rad]
-   * @param {number} rolled [m]
-   * @param {boolean} own
+   * @param place of the vehicle's middle
+   * @param scale of the body
+   * @param steering of the front wheels [rad]
+   * @param rolled [m]
    */
-  addWheels(place, { front, rear, track, radius, width }, [sx, sy], steering, rolled, own) {
+  addWheels(place: Matrix4, { front, rear, track, radius, width }: NonNullable<Body['wheels']>,
+    [sx, sy]: Scale, steering: number, rolled: number, own: boolean) {
     const aside = 0.5 * (track * sy - width);
     const sides = aside > 0.5 * width ? [-aside, aside] : [0];
     for (const [x, angle] of [[front, steering], [rear, 0]]) {
@@ -135,13 +126,11 @@ export class FittedParts {
   }
 
   /**
-   * @param {Matrix4} place of the vehicle's middle
-   * @param {NonNullable<Body['lamps']>} lamps
-   * @param {Scale} scale of the body
-   * @param {Lit} lit
-   * @param {boolean} own
+   * @param place of the vehicle's middle
+   * @param scale of the body
    */
-  addLamps(place, { front, rear, size: [width, height] }, [sx, sy, sz], lit, own) {
+  addLamps(place: Matrix4, { front, rear, size: [width, height] }: NonNullable<Body['lamps']>,
+    [sx, sy, sz]: Scale, lit: Lit, own: boolean) {
     for (const side of [1, -1]) {
       if (lit.brakes) {
         this.#addLamp(place, (rear[0] - 0.035) * sx, side * rear[1] * sy, rear[2] * sz,
@@ -159,24 +148,21 @@ export class FittedParts {
   /**
    * Add the blue lights of a priority vehicle to its roof.
    *
-   * @param {Matrix4} place of the vehicle's middle
-   * @param {Body} body
-   * @param {Scale} scale of the body
-   * @param {boolean} own
+   * @param place of the vehicle's middle
+   * @param scale of the body
    */
-  addBlueLights(place, { height }, [, sy, sz], own) {
+  addBlueLights(place: Matrix4, { height }: Body, [, sy, sz]: Scale, own: boolean) {
     for (const side of [1, -1]) {
       this.#addLamp(place, 0, side * 0.35 * sy, (height + 0.05) * sz, 0.4 * sy, 0.12, BLUE, own);
     }
   }
 
   /**
-   * @param {Matrix4} place of the thing's middle
-   * @param {number} length of its footprint [m]
-   * @param {number} width [m]
-   * @param {boolean} own
+   * @param place of the thing's middle
+   * @param length of its footprint [m]
+   * @param width [m]
    */
-  addShadow(place, length, width, own) {
+  addShadow(place: Matrix4, length: number, width: number, own: boolean) {
     this.#matrix.copy(place)
       .multiply(this.#step.makeTranslation(0, 0, SHADOW_ABOVE_M))
       .scale(this.#vector.set(length + SHADOW_BEYOND_M, width + SHADOW_BEYOND_M, 1));
@@ -184,44 +170,32 @@ export class FittedParts {
   }
 
   /**
-   * @param {Matrix4} place
-   * @param {number} x
-   * @param {number} y
-   * @param {number} z
-   * @param {number} width [m]
-   * @param {number} height [m]
-   * @param {number} color
-   * @param {boolean} own
+   * @param width [m]
+   * @param height [m]
    */
-  #addLamp(place, x, y, z, width, height, color, own) {
+  #addLamp(place: Matrix4, x: number, y: number, z: number, width: number, height: number,
+    color: number, own: boolean) {
     this.#matrix.copy(place).multiply(this.#step.makeTranslation(x, y, z))
       .scale(this.#vector.set(0.03, width, height));
     this.#lamps?.add(this.#matrix, this.#color.setHex(color), own);
   }
 }
 
-/**
- * @param {Three} three
- * @returns {Part} lamps that shine, independent of the light
- */
-function lampPart(three) {
+/** @returns lamps that shine, independent of the light */
+function lampPart(three: Three): Part {
   return { geometry: new three.BoxGeometry(1, 1, 1), tinted: true,
     material: new three.MeshBasicMaterial({ toneMapped: false }) };
 }
 
-/**
- * @param {Three} three
- * @returns {Part} shadows as dark, soft patches on the road
- */
-function shadowPart(three) {
+/** @returns shadows as dark, soft patches on the road */
+function shadowPart(three: Three): Part {
   return { geometry: new three.PlaneGeometry(1, 1), tinted: false,
     material: new three.MeshBasicMaterial({ color: 0, map: softPatch(three), transparent: true,
       depthWrite: false, polygonOffset: true, polygonOffsetFactor: -2,
       polygonOffsetUnits: -2 }) };
 }
 
-/** @param {Three} three */
-function softPatch(three) {
+function softPatch(three: Three) {
   const data = new Uint8Array(4 * SHADOW_TEXELS * SHADOW_TEXELS);
   for (let i = 0; i < SHADOW_TEXELS * SHADOW_TEXELS; i += 1) {
     const [u, v] = [i % SHADOW_TEXELS, Math.floor(i / SHADOW_TEXELS)]

@@ -11,17 +11,16 @@ export class FrameCost {
   #count = 0;
   #begin_ms = 0;
 
-  /** @param {WebGLRenderingContext|WebGL2RenderingContext} context */
-  constructor(context) {
+  constructor(context: WebGLRenderingContext | WebGL2RenderingContext) {
     this.#context = context;
   }
 
   /**
    * Begin a picture.
    *
-   * @returns {boolean} whether it is measured: then `end` is called
+   * @returns whether it is measured: then `end` is called
    */
-  begin() {
+  begin(): boolean {
     this.#count += 1;
     if (this.#count % EVERY !== 0) {
       return false;
@@ -32,10 +31,8 @@ export class FrameCost {
     return true;
   }
 
-  /**
-   * @returns {number} time of the picture [ms]
-   */
-  end() {
+  /** @returns time of the picture [ms] */
+  end(): number {
     this.#wait();
     return performance.now() - this.#begin_ms;
   }

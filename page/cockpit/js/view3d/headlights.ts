@@ -5,12 +5,12 @@
 import { contrastLeft } from './road/fog.js';
 import { mergeable, SeenInstances } from './seen_instances.js';
 
-/** @import { Group, Matrix4, MeshBasicMaterial } from 'three' */
-/** @import { Environment } from '../messages.js' */
-/** @import { Body } from './bodies/motor_vehicles.js' */
-/** @import { Scale } from './fitted_parts.js' */
-/** @import { Three } from './road/road_world.js' */
-/** @import { Part, Sight } from './seen_instances.js' */
+import type { Group, Matrix4, MeshBasicMaterial } from 'three';
+import type { Environment } from '../messages.js';
+import type { Body } from './bodies/motor_vehicles.js';
+import type { Scale } from './fitted_parts.js';
+import type { Three } from './three.js';
+import type { Part, Sight } from './seen_instances.js';
 
 // By day, low beam is on below this meteorological visibility [m].
 const FOGGY_M = 200;
@@ -29,13 +29,8 @@ const BEAM_SEEN_M = 60;
 // Vehicles this near share the light on the road, so that a queue does not make it white [m].
 const SHARED_M = 20;
 
-/**
- * Return whether people drive with their lights on.
- *
- * @param {Environment} environment
- * @returns {boolean}
- */
-export function wantsHeadlights({ light, visibility }) {
+/** Return whether people drive with their lights on. */
+export function wantsHeadlights({ light, visibility }: Environment): boolean {
   return light === 'dusk' || visibility <= FOGGY_M;
 }
 
@@ -45,13 +40,10 @@ export class Headlights {
   on = false;
   #three;
   #group;
-  /** @type {SeenInstances[]} lamps, glow and light on the road */
-  #parts = [];
-  /** @type {MeshBasicMaterial[]} */
-  #materials = [];
+  #parts: SeenInstances[] = []; // lamps, glow and light on the road
+  #materials: MeshBasicMaterial[] = [];
   // Light on the road in this picture that is not submitted yet.
-  /** @type {{matrix: Matrix4, own: boolean}[]} */
-  #beams = [];
+  #beams: { matrix: Matrix4; own: boolean }[] = [];
   #visibility = Infinity;
   #strength = 0;
   #color;
@@ -59,11 +51,7 @@ export class Headlights {
   #step;
   #vector;
 
-  /**
-   * @param {Three} three
-   * @param {Group} group
-   */
-  constructor(three, group) {
+  constructor(three: Three, group: Group) {
     this.#three = three;
     this.#group = group;
     this.#color = new three.Color();
@@ -72,11 +60,8 @@ export class Headlights {
     this.#vector = new three.Vector3();
   }
 
-  /**
-   * @param {Environment} environment
-   * @param {number} count of vehicles that may have them
-   */
-  load(environment, count) {
+  /** @param count of vehicles that may have them */
+  load(environment: Environment, count: number) {
     this.dispose();
     this.on = wantsHeadlights(environment);
     if (!this.on) {
@@ -88,7 +73,7 @@ export class Headlights {
     const parts = [lampPart(this.#three), glowPart(this.#three), beamPart(this.#three)];
     const plain = parts.map(mergeable);
     this.#materials = [...parts, ...plain].map(
-      ({ material }) => /** @type {MeshBasicMaterial} */ (material));
+      ({ material }) => material as MeshBasicMaterial);
     this.#parts = parts.map((part, i) => new SeenInstances(this.#three,
       { near: [part], far: [plain[i]], sooner: 0 }, i < 2 ? 4 * most : most));
     const [, glow, beams] = this.#parts;
@@ -104,8 +89,8 @@ export class Headlights {
     this.#beams = [];
   }
 
-  /** @param {Sight} sight of the camera that draws next */
-  see(sight) {
+  /** @param sight of the camera that draws next */
+  see(sight: Sight) {
     this.#shareBeams();
     this.#parts.forEach((part) => part.see(sight));
   }
@@ -122,17 +107,17 @@ export class Headlights {
   }
 
   /**
-   * @param {Matrix4} place of the vehicle's middle on the road
-   * @param {NonNullable<Body['lamps']>} lamps
-   * @param {Scale} scale of the body
-   * @param {number} distance from the eye [m]
-   * @param {boolean} own whether it is the vehicle in which the camera may be
+   * @param place of the vehicle's middle on the road
+   * @param scale of the body
+   * @param distance from the eye [m]
+   * @param own whether it is the vehicle in which the camera may be
    */
-  add(place, { front, rear, size: [width, height] }, [sx, sy, sz], distance, own) {
+  add(place: Matrix4, { front, rear, size: [width, height] }: NonNullable<Body['lamps']>,
+    [sx, sy, sz]: Scale, distance: number, own: boolean) {
     const [lamps, glow] = this.#parts;
     const seen = Math.min(GLOW_BRIGHTNESS * contrastLeft(distance, this.#visibility), 1);
-    for (const [at, way, color, look] of /** @type {const} */ ([
-      [front, 1, FRONT, GLOW.front], [rear, -1, REAR, GLOW.rear]])) {
+    for (const [at, way, color, look] of [
+      [front, 1, FRONT, GLOW.front], [rear, -1, REAR, GLOW.rear]] as const) {
       for (const side of [1, -1]) {
         const [x, y, z] = [at[0] * sx, side * at[1] * sy, at[2] * sz];
         lamps.add(this.#at(place, x + way * 0.03, y, z, 0)
@@ -163,34 +148,24 @@ export class Headlights {
   }
 
   /**
-   * @param {Matrix4} place
-   * @param {number} x
-   * @param {number} y
-   * @param {number} z
-   * @param {number} turned [rad]
-   * @returns {Matrix4} the same one each time
+   * @param turned [rad]
+   * @returns the same one each time
    */
-  #at(place, x, y, z, turned) {
+  #at(place: Matrix4, x: number, y: number, z: number, turned: number): Matrix4 {
     this.#matrix.copy(place).multiply(this.#step.makeTranslation(x, y, z));
     return turned === 0 ? this.#matrix
       : this.#matrix.multiply(this.#step.makeRotationZ(turned));
   }
 }
 
-/**
- * @param {Three} three
- * @returns {Part} lamps that shine
- */
-function lampPart(three) {
+/** @returns lamps that shine */
+function lampPart(three: Three): Part {
   return { geometry: new three.BoxGeometry(1, 1, 1), tinted: true,
     material: new three.MeshBasicMaterial({ toneMapped: false }) };
 }
 
-/**
- * @param {Three} three
- * @returns {Part} glow around a lamp, seen from ahead; fog dims its colour
- */
-function glowPart(three) {
+/** @returns glow around a lamp, seen from ahead; fog dims its colour */
+function glowPart(three: Three): Part {
   const map = grey(three, GLOW_TEXELS, GLOW_TEXELS, (u, v) => {
     const away = Math.hypot(2 * u - 1, 2 * v - 1);
     return 0.85 * Math.max(1 - away, 0) ** 3;
@@ -200,12 +175,8 @@ function glowPart(three) {
       toneMapped: false, depthWrite: false, blending: three.AdditiveBlending }) };
 }
 
-/**
- * @param {Three} three
- * @returns {Part} the light on the road, which brightens the surface, paint more than
- *   asphalt
- */
-function beamPart(three) {
+/** @returns the light on the road, which brightens the surface, paint more than asphalt */
+function beamPart(three: Three): Part {
   const { from, to, wide, near, texels } = BEAM;
   const map = grey(three, texels, texels / 2, (u, v) => {
     const ahead = from + u * (to - from);
@@ -226,13 +197,12 @@ function beamPart(three) {
 }
 
 /**
- * @param {Three} three
- * @param {number} width [texels]
- * @param {number} height [texels]
- * @param {(u: number, v: number) => number} shade 0 to 1, as on the screen, for
- *   places of 0 to 1
+ * @param width [texels]
+ * @param height [texels]
+ * @param shade 0 to 1, as on the screen, for places of 0 to 1
  */
-function grey(three, width, height, shade) {
+function grey(three: Three, width: number, height: number,
+  shade: (u: number, v: number) => number) {
   const data = new Uint8Array(4 * width * height);
   for (let i = 0; i < width * height; i += 1) {
     const value = 255 * shade((i % width + 0.5) / width,

@@ -4,10 +4,10 @@
 
 import { SeenInstances } from './seen_instances.js';
 
-/** @import { BufferGeometry, Group, Material, Matrix4 } from 'three' */
-/** @import { MeshBuilder } from './bodies/mesh_builder.js' */
-/** @import { Three } from './road/road_world.js' */
-/** @import { Part, Sight } from './seen_instances.js' */
+import type { BufferGeometry, Group, Material, Matrix4 } from 'three';
+import type { MeshBuilder } from './bodies/mesh_builder.js';
+import type { Three } from './three.js';
+import type { Part, Sight } from './seen_instances.js';
 
 const WHITE = 0xffffff;
 
@@ -18,14 +18,13 @@ export class Instances {
   #seen;
 
   /**
-   * @param {Three} three
-   * @param {Group} group gets the meshes
-   * @param {MeshBuilder} mesh
-   * @param {number} most how many there can be
-   * @param {MeshBuilder|null} [plain] mesh of instances far away; null: the same
-   * @param {number} [sooner] see Shapes
+   * @param group gets the meshes
+   * @param most how many there can be
+   * @param plain mesh of instances far away; null: the same
+   * @param sooner see Shapes
    */
-  constructor(three, group, mesh, most, plain = null, sooner = 1) {
+  constructor(three: Three, group: Group, mesh: MeshBuilder, most: number,
+    plain: MeshBuilder | null = null, sooner = 1) {
     this.#color = new three.Color();
     this.#material = new three.MeshLambertMaterial({ color: WHITE, vertexColors: true });
     this.#seen = new SeenInstances(three, { near: partsOf(three, mesh, this.#material),
@@ -38,17 +37,13 @@ export class Instances {
     this.#seen.clear();
   }
 
-  /**
-   * @param {Matrix4} matrix
-   * @param {number} color
-   * @param {boolean} isOwn whether it is of the vehicle in which the camera may be
-   */
-  add(matrix, color, isOwn) {
+  /** @param isOwn whether it is of the vehicle in which the camera may be */
+  add(matrix: Matrix4, color: number, isOwn: boolean) {
     this.#seen.add(matrix, this.#color.setHex(color), isOwn);
   }
 
-  /** @param {Sight} sight of the camera that draws next */
-  see(sight) {
+  /** @param sight of the camera that draws next */
+  see(sight: Sight) {
     this.#seen.see(sight);
   }
 
@@ -59,24 +54,14 @@ export class Instances {
   }
 }
 
-/**
- * @param {Three} three
- * @param {MeshBuilder} mesh
- * @param {Material} material
- * @returns {Part[]}
- */
-function partsOf(three, mesh, material) {
+function partsOf(three: Three, mesh: MeshBuilder, material: Material): Part[] {
   return [true, false].map((tinted) => (
     { geometry: geometryOf(three, mesh.arrays(tinted)), material, tinted }))
     .filter(({ geometry }) => geometry.getAttribute('position').count > 0);
 }
 
-/**
- * @param {Three} three
- * @param {ReturnType<MeshBuilder['arrays']>} arrays
- * @returns {BufferGeometry}
- */
-export function geometryOf(three, { positions, normals, colors }) {
+export function geometryOf(three: Three,
+  { positions, normals, colors }: ReturnType<MeshBuilder['arrays']>): BufferGeometry {
   const geometry = new three.BufferGeometry();
   geometry.setAttribute('position', new three.BufferAttribute(positions, 3));
   geometry.setAttribute('normal', new three.BufferAttribute(normals, 3));

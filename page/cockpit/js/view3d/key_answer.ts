@@ -20,10 +20,10 @@ export class KeyAnswer {
   /**
    * Record that a driving key was pressed or released.
    *
-   * @param {number} newest_t of the newest state that has come [s]
-   * @param {number} rate simulated seconds per second
+   * @param newest_t of the newest state that has come [s]
+   * @param rate simulated seconds per second
    */
-  pressed(newest_t, rate) {
+  pressed(newest_t: number, rate: number) {
     this.#pressed_t = newest_t;
     this.#last_s = FIRST_S + WAY_S * rate;
     this.#left = MOST_PICTURES;
@@ -32,10 +32,10 @@ export class KeyAnswer {
   /**
    * Return whether a picture may show the answer.
    *
-   * @param {number} t simulation time that it would show [s]
-   * @returns {boolean} false too once there have been enough
+   * @param t simulation time that it would show [s]
+   * @returns false too once there have been enough
    */
-  isDue(t) {
+  isDue(t: number): boolean {
     const since_s = t - this.#pressed_t;
     return this.#left > 0 && since_s >= FIRST_S && since_s <= this.#last_s;
   }

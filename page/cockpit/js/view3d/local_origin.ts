@@ -8,16 +8,16 @@
  * whose resolution at the 1e6 m of UTM coordinates is only 0.1 m.
  */
 
-/** @import { Scene } from '../messages.js' */
+import type { Scene } from '../messages.js';
 
-/** @typedef {{x: number, y: number}} Origin in the map's coordinates [m] */
+export interface Origin { x: number; y: number } // in the map's coordinates [m]
 
 /**
  * Return the origin of a scene: always the same one for the same scene.
  *
- * @param {Pick<Scene, 'bounds'>} scene the scene document
- * @returns {Origin} whole metres, amid the map; local x = map x - origin x
+ * @param scene the scene document
+ * @returns whole metres, amid the map; local x = map x - origin x
  */
-export function localOrigin({ bounds: [xmin, ymin, xmax, ymax] }) {
+export function localOrigin({ bounds: [xmin, ymin, xmax, ymax] }: Pick<Scene, 'bounds'>): Origin {
   return { x: Math.round((xmin + xmax) / 2), y: Math.round((ymin + ymax) / 2) };
 }

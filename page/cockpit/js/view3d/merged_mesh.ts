@@ -5,31 +5,23 @@
  * instances as fast. A renderer on the processor needs as long for an instance as for a draw call.
  */
 
-/** @import { BufferAttribute, BufferGeometry, Mesh } from 'three' */
-/** @import { Part } from './seen_instances.js' */
-/** @typedef {typeof import('./three.js')} Three */
+import type { BufferAttribute, BufferGeometry, Mesh } from 'three';
+import type { Part } from './seen_instances.js';
+import type { Three } from './three.js';
 
 // Attributes that are copied unchanged, and their numbers per corner.
-/** @type {Record<string, number>} */
-const COPIED = { uv: 2, rank: 1 };
+const COPIED: Record<string, number> = { uv: 2, rank: 1 };
 
 /** The corners of all parts of a shape, one after the other. */
 class Corners {
-  /** @type {number[]} */
-  positions = [];
-  /** @type {number[]} */
-  normals = [];
-  /** @type {number[]} */
-  colors = [];
-  /** @type {boolean[]} whether the colour is multiplied by that of the thing */
-  tinted = [];
-  /** @type {number[]} */
-  indices = [];
-  /** @type {Record<string, number[]>} */
-  copied = {};
+  positions: number[] = [];
+  normals: number[] = [];
+  colors: number[] = [];
+  tinted: boolean[] = []; // whether the colour is multiplied by that of the thing
+  indices: number[] = [];
+  copied: Record<string, number[]> = {};
 
-  /** @param {Part[]} parts */
-  constructor(parts) {
+  constructor(parts: Part[]) {
     for (const { geometry, tinted } of parts) {
       this.#add(geometry, tinted);
     }
@@ -39,11 +31,7 @@ class Corners {
     return this.tinted.length;
   }
 
-  /**
-   * @param {BufferGeometry} geometry
-   * @param {boolean} tinted
-   */
-  #add({ attributes, index }, tinted) {
+  #add({ attributes, index }: BufferGeometry, tinted: boolean) {
     const first = this.count;
     const { count } = attributes.position;
     this.positions.push(...attributes.position.array);
@@ -62,8 +50,7 @@ class Corners {
 
 /** One mesh; `begin`, `add` for each thing, `end`. */
 export class MergedMesh {
-  /** @type {Mesh} */
-  mesh;
+  mesh: Mesh;
   #corners;
   #positions;
   #normals;
@@ -71,22 +58,20 @@ export class MergedMesh {
   #count = 0;
 
   /**
-   * @param {Three} three
-   * @param {Part[]} parts of one material
-   * @param {number} most how many things there can be
+   * @param parts of one material
+   * @param most how many things there can be
    */
-  constructor(three, parts, most) {
+  constructor(three: Three, parts: Part[], most: number) {
     const corners = new Corners(parts);
     this.#corners = corners;
     const geometry = new three.BufferGeometry();
-    /** @type {(name: string, size: number) => BufferAttribute} */
-    const attribute = (name, size) => {
+    const attribute = (name: string, size: number): BufferAttribute => {
       const made = new three.BufferAttribute(new Float32Array(size * corners.count * most), size);
       geometry.setAttribute(name, made);
       return made;
     };
-    /** @type {(name: string) => BufferAttribute} */
-    const filled = (name) => attribute(name, 3).setUsage(three.DynamicDrawUsage);
+    const filled = (
+      name: string): BufferAttribute => attribute(name, 3).setUsage(three.DynamicDrawUsage);
     this.#positions = filled('position');
     this.#normals = filled('normal');
     this.#colors = filled('color');
@@ -114,11 +99,11 @@ export class MergedMesh {
   }
 
   /**
-   * @param {Float32Array} m matrices
-   * @param {Float32Array} tints colours
-   * @param {number} which of them
+   * @param m matrices
+   * @param tints colours
+   * @param which of them
    */
-  add(m, tints, which) {
+  add(m: Float32Array, tints: Float32Array, which: number) {
     const { count, positions, normals, colors, tinted } = this.#corners;
     const [o, c] = [16 * which, 3 * which];
     // As three.js transforms normals of scaled instances: by the inverse of the squared scales.

@@ -2,26 +2,24 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The optics of a mirror: a camera at the mirror image of the driver's eye. */
 
-/** @import { DriverPlace } from '../messages.js' */
-/** @import { Point } from './cameras.js' */
+import type { DriverPlace } from '../messages.js';
+import type { Point } from './cameras.js';
 
 const DEGREE = Math.PI / 180;
 
-/**
- * A mirror of a vehicle, convex like the side mirrors of cars.
- *
- * @typedef {object} Mirror
- * @property {'left'|'right'|'inner'} name
- * @property {'left_mirror'|'right_mirror'|'inner_mirror'} mount its place in the scene document
- * @property {number} width of its glass [m]
- * @property {number} height [m]
- * @property {number} radius of the sphere that it is part of; infinite for a flat one [m]
- * @property {number} aside direction of its middle, to the left of straight back [rad]
- * @property {number} pitch above the horizon [rad]
- */
+/** A mirror of a vehicle, convex like the side mirrors of cars. */
+export interface Mirror {
+  name: 'left' | 'right' | 'inner';
+  mount: 'left_mirror' | 'right_mirror' | 'inner_mirror'; // its place in the scene document
+  width: number; // of its glass [m]
+  height: number; // [m]
+  radius: number; // of the sphere that it is part of; infinite for a flat one [m]
+  aside: number; // direction of its middle, to the left of straight back [rad]
+  pitch: number; // above the horizon [rad]
+}
 
-/** @type {readonly Mirror[]} UN R46: at least 1.2 m for the outer mirrors of cars. */
-export const MIRRORS = Object.freeze([
+/** UN R46: at least 1.2 m for the outer mirrors of cars. */
+export const MIRRORS: readonly Mirror[] = Object.freeze([
   { name: 'left', mount: 'left_mirror', width: 0.19, height: 0.13, radius: 1.4,
     aside: -11 * DEGREE, pitch: -3 * DEGREE },
   { name: 'inner', mount: 'inner_mirror', width: 0.24, height: 0.065, radius: Infinity,
@@ -30,17 +28,15 @@ export const MIRRORS = Object.freeze([
     aside: 9 * DEGREE, pitch: -3 * DEGREE },
 ]);
 
-/**
- * The camera of a mirror. Its picture is mirrored, left to right.
- *
- * @typedef {object} MirrorCamera
- * @property {Point} point ahead of the rear axle, to the left, above the road [m]
- * @property {number} aside to the left of straight ahead [rad]
- * @property {number} pitch above the horizon [rad]
- * @property {number} height angle of the picture in height [rad]
- * @property {number} aspect width of the picture through its height
- * @property {number} near plane, at the glass [m]
- */
+/** The camera of a mirror. Its picture is mirrored, left to right. */
+export interface MirrorCamera {
+  point: Point; // ahead of the rear axle, to the left, above the road [m]
+  aside: number; // to the left of straight ahead [rad]
+  pitch: number; // above the horizon [rad]
+  height: number; // angle of the picture in height [rad]
+  aspect: number; // width of the picture through its height
+  near: number; // plane, at the glass [m]
+}
 
 /**
  * Return the camera of a mirror.
@@ -48,11 +44,10 @@ export const MIRRORS = Object.freeze([
  * The glass stands across the line on which the driver sees its middle. The eye at distance d has
  * its image behind the glass at 1/d' = 1/d + 2/R (the mirror equation for a far eye, f = -R/2).
  *
- * @param {Mirror} mirror
- * @param {DriverPlace} place eyes and mirrors of the vehicle
- * @returns {MirrorCamera|null} null without this mirror
+ * @param place eyes and mirrors of the vehicle
+ * @returns null without this mirror
  */
-export function mirrorCamera(mirror, place) {
+export function mirrorCamera(mirror: Mirror, place: DriverPlace): MirrorCamera | null {
   const glass = place[mirror.mount];
   if (glass === null) {
     return null;

@@ -4,10 +4,10 @@
 
 import { mirrorCamera, MIRRORS } from './mirror_optics.js';
 
-/** @import { PerspectiveCamera, Scene as Scene3, WebGLRenderer } from 'three' */
-/** @import { DriverPlace } from '../messages.js' */
-/** @import { Mirror, MirrorCamera } from './mirror_optics.js' */
-/** @import { Three } from './road/road_world.js' */
+import type { PerspectiveCamera, Scene as Scene3, WebGLRenderer } from 'three';
+import type { DriverPlace } from '../messages.js';
+import type { Mirror, MirrorCamera } from './mirror_optics.js';
+import type { Three } from './three.js';
 
 // Places on the screen: middle and width as shares of its width and height, from below.
 const PLACES = {
@@ -20,16 +20,14 @@ const COARSER = 0.75;
 const FRAME_PX = 4;
 const FRAME = 0x14161a;
 
-/**
- * @typedef {{left: number, bottom: number, width: number, height: number}} Rectangle [CSS px]
- */
+// [CSS px]
+export interface Rectangle { left: number; bottom: number; width: number; height: number }
 
 /** Mirrors of the driver's vehicle. */
 export class Mirrors {
   #overlay;
   #flat;
-  /** @type {ReturnType<typeof makeGlass>[]} */
-  #glasses;
+  #glasses: ReturnType<typeof makeGlass>[];
   #next = 0;
   /** Number of mirror pictures so far. */
   count = 0;
@@ -38,11 +36,8 @@ export class Mirrors {
   #width = 1;
   #height = 1;
 
-  /**
-   * @param {Three} three
-   * @param {boolean} software whether the processor draws
-   */
-  constructor(three, software) {
+  /** @param software whether the processor draws */
+  constructor(three: Three, software: boolean) {
     this.#overlay = new three.Scene();
     this.#flat = new three.OrthographicCamera(0, 1, 1, 0, -1, 1);
     this.#glasses = MIRRORS.map((mirror) => makeGlass(three, this.#overlay, mirror, software));
@@ -51,11 +46,11 @@ export class Mirrors {
   /**
    * Fit the mirrors into a picture.
    *
-   * @param {number} width [CSS px]
-   * @param {number} height [CSS px]
-   * @param {number} ratio of pixels to CSS pixels
+   * @param width [CSS px]
+   * @param height [CSS px]
+   * @param ratio of pixels to CSS pixels
    */
-  resize(width, height, ratio) {
+  resize(width: number, height: number, ratio: number) {
     this.#width = width;
     this.#height = height;
     this.#flat.right = width;
@@ -74,10 +69,10 @@ export class Mirrors {
   }
 
   /**
-   * @param {DriverPlace} place of the vehicle
-   * @param {number} far [m]
+   * @param place of the vehicle
+   * @param far [m]
    */
-  fit(place, far) {
+  fit(place: DriverPlace, far: number) {
     for (const glass of this.#glasses) {
       glass.optics = mirrorCamera(glass.mirror, place);
       glass.pane.visible = glass.frame.visible = glass.optics !== null;
@@ -94,12 +89,10 @@ export class Mirrors {
   /**
    * Draw the next mirror.
    *
-   * @param {WebGLRenderer} renderer
-   * @param {Scene3} scene
-   * @param {(camera: PerspectiveCamera, optics: MirrorCamera) => void} aim puts a camera where
-   *   the vehicle is
+   * @param aim puts a camera where the vehicle is
    */
-  drawNext(renderer, scene, aim) {
+  drawNext(renderer: WebGLRenderer, scene: Scene3,
+    aim: (camera: PerspectiveCamera, optics: MirrorCamera) => void) {
     const { mirror, target, camera, optics, size } = this.#glasses[this.#next];
     this.drawn = mirror.name;
     this.count += 1;
@@ -114,29 +107,21 @@ export class Mirrors {
     }
   }
 
-  /** @param {WebGLRenderer} renderer has drawn the view */
-  drawOver(renderer) {
+  /** @param renderer has drawn the view */
+  drawOver(renderer: WebGLRenderer) {
     renderer.autoClear = false;
     renderer.clearDepth();
     renderer.render(this.#overlay, this.#flat);
     renderer.autoClear = true;
   }
 
-  /**
-   * Return each mirror's camera and place on the screen.
-   *
-   * @returns {{name: string, camera: PerspectiveCamera, rectangle: Rectangle}[]}
-   */
-  get all() {
+  /** Return each mirror's camera and place on the screen. */
+  get all(): { name: string; camera: PerspectiveCamera; rectangle: Rectangle }[] {
     return this.#glasses.map(({ mirror, camera }) => (
       { name: mirror.name, camera, rectangle: this.#rectangle(mirror) }));
   }
 
-  /**
-   * @param {Mirror} mirror
-   * @returns {Rectangle}
-   */
-  #rectangle({ name, width, height }) {
+  #rectangle({ name, width, height }: Mirror): Rectangle {
     const { x, y, width: share } = PLACES[name];
     const w = share * this.#width;
     const h = (w * height) / width;
@@ -145,13 +130,8 @@ export class Mirrors {
   }
 }
 
-/**
- * @param {Three} three
- * @param {Scene3} overlay gets the glass and its frame
- * @param {Mirror} mirror
- * @param {boolean} software
- */
-function makeGlass(three, overlay, mirror, software) {
+/** @param overlay gets the glass and its frame */
+function makeGlass(three: Three, overlay: Scene3, mirror: Mirror, software: boolean) {
   const target = new three.WebGLRenderTarget(16, 8, { samples: software ? 0 : 4 });
   const camera = new three.PerspectiveCamera();
   const pane = new three.Mesh(turnedOver(three),
@@ -161,12 +141,11 @@ function makeGlass(three, overlay, mirror, software) {
     new three.MeshBasicMaterial({ color: FRAME, depthTest: false, toneMapped: false }));
   overlay.add(frame, pane);
   return { mirror, target, camera, pane, frame,
-    size: /** @type {[number, number]} */ ([16, 8]),
-    optics: /** @type {MirrorCamera|null} */ (null) };
+    size: [16, 8] as [number, number],
+    optics: null as MirrorCamera | null };
 }
 
-/** @param {Three} three */
-function turnedOver(three) {
+function turnedOver(three: Three) {
   const plane = new three.PlaneGeometry(1, 1);
   const uv = plane.getAttribute('uv');
   for (let i = 0; i < uv.count; i += 1) {

@@ -15,11 +15,12 @@ import { sightOf } from './seen_instances.js';
 import { Traffic } from './traffic.js';
 import { standOf } from './vehicle_stand.js';
 
-/** @import { Mesh, PerspectiveCamera } from 'three' */
-/** @import { Scene, SceneVehicle } from '../messages.js' */
-/** @import { Shown, Store } from '../store.js' */
-/** @import { CameraPose, Stand, Viewpoint } from './cameras.js' */
-/** @import { RoadWorld, Three } from './road/road_world.js' */
+import type { Mesh, PerspectiveCamera } from 'three';
+import type { Scene, SceneVehicle } from '../messages.js';
+import type { Shown, Store } from '../store.js';
+import type { CameraPose, Stand, Viewpoint } from './cameras.js';
+import type { RoadWorld } from './road/road_world.js';
+import type { Three } from './three.js';
 
 const NEAR_M = 0.2;
 const FAR_M = 3000;
@@ -28,17 +29,15 @@ const FAR_IN_MIRROR_M = 300;
 // It also has few pixels: things are plain from this share of the distance on.
 const PLAIN_IN_MIRROR = 0.5;
 
-/**
- * The view to draw.
- *
- * @typedef {object} Looks
- * @property {Viewpoint} viewpoint
- * @property {number} index of the vehicle
- * @property {number} aside to the left of straight ahead [rad]
- * @property {number} height angle of the picture in height [rad]
- * @property {boolean} mirrors whether the driver has them
- * @property {boolean} plans whether the AVs' plans are shown
- */
+/** The view to draw. */
+export interface Looks {
+  viewpoint: Viewpoint;
+  index: number; // of the vehicle
+  aside: number; // to the left of straight ahead [rad]
+  height: number; // angle of the picture in height [rad]
+  mirrors: boolean; // whether the driver has them
+  plans: boolean; // whether the AVs' plans are shown
+}
 
 /** The picture of the state that a store shows. */
 export class Picture {
@@ -55,21 +54,17 @@ export class Picture {
   #quality;
   #cost;
   #size = { width: 1, height: 1 };
-  /** @type {RoadWorld|null} */
-  #road = null;
-  /** @type {Scene|null} */
-  #document = null;
-  /** @type {{mesh: Mesh, vehicle: SceneVehicle}|null} */
-  #cabin = null;
+  #road: RoadWorld | null = null;
+  #document: Scene | null = null;
+  #cabin: { mesh: Mesh; vehicle: SceneVehicle } | null = null;
   #origin = { x: 0, y: 0 };
+  store;
 
   /**
-   * @param {Three} three the library
-   * @param {HTMLCanvasElement} canvas
-   * @param {Store} store
+   * @param three the library
    * @throws {Error} if the browser has no WebGL 2
    */
-  constructor(three, canvas, store) {
+  constructor(three: Three, canvas: HTMLCanvasElement, store: Store) {
     this.#three = three;
     const name = rendererName();
     const software = isSoftware(name);
@@ -98,8 +93,8 @@ export class Picture {
     return this.#quality.period_ms;
   }
 
-  /** @param {boolean} sharp whether all pixels of the screen are drawn, at any cost */
-  set sharp(sharp) {
+  /** @param sharp whether all pixels of the screen are drawn, at any cost */
+  set sharp(sharp: boolean) {
     if (sharp !== this.#quality.sharp) {
       this.#quality.sharp = sharp;
       this.#choose();
@@ -123,10 +118,10 @@ export class Picture {
   }
 
   /**
-   * @param {number} width [CSS px]
-   * @param {number} height [CSS px]
+   * @param width [CSS px]
+   * @param height [CSS px]
    */
-  resize(width, height) {
+  resize(width: number, height: number) {
     this.#size = { width, height };
     const { ratio } = this.#quality;
     this.#renderer.setPixelRatio(ratio);
@@ -138,12 +133,11 @@ export class Picture {
   /**
    * Draw one picture.
    *
-   * @param {Shown} shown current rows
-   * @param {number} now_ms the animation frame's time
-   * @param {Looks} looks
-   * @returns {boolean} false while nothing can be seen
+   * @param shown current rows
+   * @param now_ms the animation frame's time
+   * @returns false while nothing can be seen
    */
-  draw(shown, now_ms, looks) {
+  draw(shown: Shown, now_ms: number, looks: Looks): boolean {
     const vehicle = this.#document?.vehicles[looks.index];
     const road = this.#road;
     if (vehicle === undefined || road === null || this.lost) {
@@ -175,12 +169,7 @@ export class Picture {
     return true;
   }
 
-  /**
-   * @param {Stand} stand
-   * @param {SceneVehicle} vehicle
-   * @param {Looks} looks
-   */
-  #aimMain(stand, vehicle, { viewpoint, aside, height }) {
+  #aimMain(stand: Stand, vehicle: SceneVehicle, { viewpoint, aside, height }: Looks) {
     const [x, y, z] = vehicle.driver_place.eye;
     const rear = vehicle.rear_to_center - 0.5 * vehicle.shape.length;
     const pose = viewpoint === 'driver' ? mountedAt(stand, { x, y, z }, aside)
@@ -192,11 +181,7 @@ export class Picture {
     this.#aim(this.#camera, pose);
   }
 
-  /**
-   * @param {PerspectiveCamera} camera
-   * @param {CameraPose} pose
-   */
-  #aim(camera, { x, y, z, yaw, slope, aside, pitch }) {
+  #aim(camera: PerspectiveCamera, { x, y, z, yaw, slope, aside, pitch }: CameraPose) {
     camera.position.set(x - this.#origin.x, y - this.#origin.y, z);
     const { Euler, Quaternion } = this.#three;
     // At rest a camera looks down, with its upper edge to the north. It is pitched, then turned in
@@ -207,11 +192,7 @@ export class Picture {
     camera.updateMatrixWorld();
   }
 
-  /**
-   * @param {Stand} stand
-   * @param {SceneVehicle} vehicle
-   */
-  #drawMirror(stand, vehicle) {
+  #drawMirror(stand: Stand, vehicle: SceneVehicle) {
     if (this.#cabin !== null) {
       this.#cabin.mesh.visible = false;
     }
@@ -225,11 +206,10 @@ export class Picture {
   /**
    * Submit the things that a camera sees.
    *
-   * @param {PerspectiveCamera} camera
-   * @param {number} sooner share of the distance at which things are plain
-   * @param {boolean} own whether the own vehicle is drawn
+   * @param sooner share of the distance at which things are plain
+   * @param own whether the own vehicle is drawn
    */
-  #see(camera, sooner, own) {
+  #see(camera: PerspectiveCamera, sooner: number, own: boolean) {
     const sight = sightOf(this.#three, camera, sooner * this.#quality.detail.plain_m, own);
     this.#road?.see(sight);
     this.#traffic.see(sight);
@@ -242,12 +222,7 @@ export class Picture {
     this.#road?.setFine(fine);
   }
 
-  /**
-   * @param {Stand} stand
-   * @param {SceneVehicle} vehicle
-   * @param {boolean} inside
-   */
-  #drawMain(stand, vehicle, inside) {
+  #drawMain(stand: Stand, vehicle: SceneVehicle, inside: boolean) {
     if (inside && this.#cabin?.vehicle !== vehicle) {
       this.#cabin?.mesh.removeFromParent();
       this.#cabin?.mesh.geometry.dispose();
@@ -265,13 +240,7 @@ export class Picture {
     this.#renderer.render(this.#scene, this.#camera);
   }
 
-  /**
-   * @param {number} t
-   * @param {number} begin_ms
-   * @param {number} now_ms
-   * @param {boolean} measures
-   */
-  #note(t, begin_ms, now_ms, measures) {
+  #note(t: number, begin_ms: number, now_ms: number, measures: boolean) {
     const { calls, triangles } = this.#renderer.info.render;
     Object.assign(this.stats, { frames: this.stats.frames + 1, t, draw_calls: calls, triangles,
       frame_ms: performance.now() - begin_ms });
@@ -284,8 +253,7 @@ export class Picture {
     }
   }
 
-  /** @param {Scene} scene */
-  #load(scene) {
+  #load(scene: Scene) {
     // A reset sends the same scene again, so its roads stay.
     if (this.#road === null || this.#document?.id !== scene.id) {
       this.#road?.group.removeFromParent();

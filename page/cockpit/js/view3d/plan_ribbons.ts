@@ -5,12 +5,12 @@
 import { PLAN_WIDTH } from '../frames.js';
 import { themeColor } from '../world/palette.js';
 
-/** @import { Group } from 'three' */
-/** @import { PlanFrame } from '../frames.js' */
-/** @import { Shown, Store } from '../store.js' */
-/** @import { Origin } from './local_origin.js' */
-/** @import { Three } from './road/road_world.js' */
-/** @import { HeightAt } from './traffic.js' */
+import type { Group } from 'three';
+import type { PlanFrame } from '../frames.js';
+import type { Shown, Store } from '../store.js';
+import type { Origin } from './local_origin.js';
+import type { Three } from './three.js';
+import type { HeightAt } from './traffic.js';
 
 const HALF_WIDTH_M = 0.35;
 const ABOVE_M = 0.08;
@@ -22,12 +22,7 @@ export class PlanRibbons {
   #store;
   #mesh;
 
-  /**
-   * @param {Three} three
-   * @param {Group} group
-   * @param {Store} store
-   */
-  constructor(three, group, store) {
+  constructor(three: Three, group: Group, store: Store) {
     this.#three = three;
     this.#store = store;
     this.#mesh = new three.Mesh(new three.BufferGeometry(), new three.MeshBasicMaterial({
@@ -39,19 +34,13 @@ export class PlanRibbons {
     group.add(this.#mesh);
   }
 
-  /**
-   * @param {boolean} on whether plans are shown
-   * @param {Shown} shown
-   * @param {Origin} origin
-   * @param {HeightAt} heightAt
-   */
-  update(on, shown, origin, heightAt) {
+  /** @param on whether plans are shown */
+  update(on: boolean, shown: Shown, origin: Origin, heightAt: HeightAt) {
     this.#mesh.visible = on;
     if (!on) {
       return;
     }
-    /** @type {number[]} */
-    const positions = [];
+    const positions: number[] = [];
     for (const plan of this.#store.plans.values()) {
       addRibbon(positions, plan, shown.t, origin, heightAt);
     }
@@ -63,16 +52,10 @@ export class PlanRibbons {
   }
 }
 
-/**
- * @param {number[]} positions
- * @param {PlanFrame} plan
- * @param {number} t simulation time that is shown; the past part of the plan is left out [s]
- * @param {Origin} origin
- * @param {HeightAt} heightAt
- */
-function addRibbon(positions, { points, t: start_t }, t, origin, heightAt) {
-  /** @type {number[][]|null} */
-  let before = null;
+/** @param t simulation time that is shown; the past part of the plan is left out [s] */
+function addRibbon(positions: number[], { points, t: start_t }: PlanFrame, t: number,
+  origin: Origin, heightAt: HeightAt) {
+  let before: number[][] | null = null;
   for (let row = 0; row < points.length; row += PLAN_WIDTH) {
     const [x, y, yaw, , after] = points.subarray(row, row + PLAN_WIDTH);
     if (start_t + after >= t) {

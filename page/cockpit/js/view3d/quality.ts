@@ -5,20 +5,18 @@
  * machine. The renderer's name only provides a good first guess.
  */
 
-/**
- * The level of detail of a picture.
- *
- * @typedef {object} Detail
- * @property {number} plain_m beyond it vehicles and trees have few triangles
- * @property {number} farthest_m beyond it no vehicle is drawn
- * @property {number} wheels_m beyond it wheels are discs on the flanks
- * @property {boolean} fine whether the sky has a sun and a glow, and surfaces are as sharp as
- *   possible in the distance
- * @property {number} mirrorEvery a mirror is drawn with each picture, or with each second one
- */
+/** The level of detail of a picture. */
+export interface Detail {
+  plain_m: number; // beyond it vehicles and trees have few triangles
+  farthest_m: number; // beyond it no vehicle is drawn
+  wheels_m: number; // beyond it wheels are discs on the flanks
+  // whether the sky has a sun and a glow, and surfaces are as sharp as possible in the distance
+  fine: boolean;
+  mirrorEvery: number; // a mirror is drawn with each picture, or with each second one
+}
 
-/** From full detail to barely distinguishable things. @type {Detail[]} */
-export const DETAILS = [
+/** From full detail to barely distinguishable things. */
+export const DETAILS: Detail[] = [
   { plain_m: Infinity, farthest_m: 600, wheels_m: 600, fine: true, mirrorEvery: 1 },
   { plain_m: 60, farthest_m: 400, wheels_m: 90, fine: false, mirrorEvery: 1 },
   { plain_m: 30, farthest_m: 250, wheels_m: 50, fine: false, mirrorEvery: 2 },
@@ -27,11 +25,9 @@ export const DETAILS = [
 /**
  * Share of the possible pixels in each direction, and index of the detail, from the best to the
  * cheapest.
- *
- * @type {[share: number, detail: number][]}
  */
-const RUNGS = [[1, 0], [0.85, 0], [0.7, 0], [0.7, 1], [0.6, 1], [0.5, 1], [0.42, 1], [0.42, 2],
-  [0.35, 2], [0.3, 2], [0.25, 2]];
+const RUNGS: [share: number, detail: number][] = [[1, 0], [0.85, 0], [0.7, 0], [0.7, 1], [0.6, 1],
+  [0.5, 1], [0.42, 1], [0.42, 2], [0.35, 2], [0.3, 2], [0.25, 2]];
 // Longest time until a picture is complete [ms].
 const BUDGET_MS = 9;
 // The first rung. Pictures drawn by the processor take time from the simulation on the same
@@ -54,10 +50,9 @@ const SOFTWARE_NAMES = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 /**
  * Return whether a renderer is the processor.
  *
- * @param {string} name from WEBGL_debug_renderer_info
- * @returns {boolean}
+ * @param name from WEBGL_debug_renderer_info
  */
-export function isSoftware(name) {
+export function isSoftware(name: string): boolean {
   return SOFTWARE_NAMES.test(name);
 }
 
@@ -74,10 +69,10 @@ export class Quality {
   sharp = false;
 
   /**
-   * @param {boolean} software whether the processor draws
-   * @param {number} deviceRatio pixels of the screen to a CSS pixel
+   * @param software whether the processor draws
+   * @param deviceRatio pixels of the screen to a CSS pixel
    */
-  constructor(software, deviceRatio) {
+  constructor(software: boolean, deviceRatio: number) {
     this.#limits = software ? SOFTWARE : HARDWARE;
     this.#finest = Math.min(deviceRatio, FINEST);
     this.#rung = this.#limits.start;
@@ -104,11 +99,10 @@ export class Quality {
   /**
    * Record the cost of a picture.
    *
-   * @param {number} cost_ms time until it was complete
-   * @param {number} now_ms
-   * @returns {boolean} whether ratio or detail have changed
+   * @param cost_ms time until it was complete
+   * @returns whether ratio or detail have changed
    */
-  adjust(cost_ms, now_ms) {
+  adjust(cost_ms: number, now_ms: number): boolean {
     this.#cost_ms = cost_ms;
     if (this.sharp || now_ms - this.#changed_ms < EVERY_MS) {
       return false;

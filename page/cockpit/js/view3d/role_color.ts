@@ -4,22 +4,19 @@
 
 import { themeColor } from '../world/palette.js';
 
-/** @import { Three } from './road/road_world.js' */
+import type { Three } from './three.js';
 
-/** @type {Record<string, string|undefined>} */
-const NAMES = {
+const NAMES: Record<string, string | undefined> = {
   human: 'human', autonomous: 'av', traffic: 'traffic', scripted: 'scripted', static: 'static',
 };
 
 /**
  * Return a function that returns the colour of a role.
  *
- * @param {Three} three
- * @returns {(role: string, type: string) => number} of vehicles and objects of the scene
+ * @returns of vehicles and objects of the scene
  */
-export function roleColor(three) {
-  /** @type {Map<string, number>} */
-  const known = new Map();
+export function roleColor(three: Three): (role: string, type: string) => number {
+  const known = new Map<string, number>();
   return (role, type) => {
     const name = type === 'pedestrian' || type === 'bicycle' ? 'vulnerable'
       : NAMES[role] ?? 'recorded';

@@ -2,43 +2,41 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Synchronisation of the windows of one seat: all show the simulation time of the leading one. */
 
-/** @import { Store } from '../store.js' */
+import type { Store } from '../store.js';
 
 const CHANNEL = 'crgame-seat';
 // After this silence, the leader is gone or its window is hidden [ms].
 const SILENCE_MS = 400;
 
-/**
- * The message of the leader in each frame.
- *
- * @typedef {object} Beat
- * @property {number} t simulation time that it shows [s]
- * @property {number} at_ms time of the message, by the machine's clock
- * @property {number} rate simulated seconds per second; 0 while it stands still
- * @property {number} epoch counts resets
- * @property {string|null} vehicle whose view it shows
- */
+/** The message of the leader in each frame. */
+export interface Beat {
+  t: number; // simulation time that it shows [s]
+  at_ms: number; // time of the message, by the machine's clock
+  rate: number; // simulated seconds per second; 0 while it stands still
+  epoch: number; // counts resets
+  vehicle: string | null; // whose view it shows
+}
 
-/**
- * @typedef {{info: object|null, t: number, seek: (t: number) => unknown,
- *   pause: () => void}} Player
- */
+export interface Player {
+  info: object | null;
+  t: number;
+  seek: (t: number) => unknown;
+  pause: () => void;
+}
 
 /** The sender or receiver of the shown time. */
 export class SeatClock {
   #store;
   #channel = new BroadcastChannel(CHANNEL);
-  /** @type {Beat|null} */
-  #heard = null;
+  #heard: Beat | null = null;
   #follows;
   #last = { t: NaN, at_ms: NaN };
 
   /**
-   * @param {Store} store
-   * @param {boolean} follows whether this window follows another one
-   * @param {string|null} wanted id of the vehicle whose leader is followed; null for any
+   * @param follows whether this window follows another one
+   * @param wanted id of the vehicle whose leader is followed; null for any
    */
-  constructor(store, follows, wanted) {
+  constructor(store: Store, follows: boolean, wanted: string | null) {
     this.#store = store;
     this.#follows = follows;
     if (follows) {
@@ -58,33 +56,31 @@ export class SeatClock {
   /**
    * Send the shown time to the followers.
    *
-   * @param {number} now_ms the animation frame's time
-   * @param {number} t simulation time that is shown [s]
-   * @param {string|null} vehicle
+   * @param now_ms the animation frame's time
+   * @param t simulation time that is shown [s]
    */
-  send(now_ms, t, vehicle) {
+  send(now_ms: number, t: number, vehicle: string | null) {
     if (this.#follows) {
       return;
     }
     const at_ms = performance.timeOrigin + now_ms;
     const rate = (t - this.#last.t) / (at_ms - this.#last.at_ms) * 1000;
     this.#last = { t, at_ms };
-    /** @type {Beat} */
-    const beat = { t, at_ms, rate: Number.isFinite(rate) ? rate : 0, epoch: this.#store.epoch,
-      vehicle };
+    const beat: Beat = { t, at_ms, rate: Number.isFinite(rate) ? rate : 0,
+      epoch: this.#store.epoch, vehicle };
     this.#channel.postMessage(beat);
   }
 
   /**
    * Show the leader's time before a frame, while there is a leader.
    *
-   * @param {number} now_ms the animation frame's time
+   * @param now_ms the animation frame's time
    */
-  follow(now_ms) {
+  follow(now_ms: number) {
     if (!this.#follows) {
       return;
     }
-    const player = /** @type {Player|undefined} */ (window.crgame.replay);
+    const player = window.crgame.replay as Player | undefined;
     if (this.#store.mode === 'replay') {
       if (player?.info && this.#leads(now_ms)) {
         player.pause();
@@ -97,16 +93,14 @@ export class SeatClock {
     }
   }
 
-  /** @param {number} now_ms */
-  #leads(now_ms) {
+  #leads(now_ms: number) {
     const beat = this.#heard;
     return beat !== null && beat.epoch === this.#store.epoch
       && performance.timeOrigin + now_ms - beat.at_ms < SILENCE_MS;
   }
 
-  /** @param {number} now_ms */
-  #time(now_ms) {
-    const { t, at_ms, rate } = /** @type {Beat} */ (this.#heard);
+  #time(now_ms: number) {
+    const { t, at_ms, rate } = this.#heard as Beat;
     const since_ms = Math.max(performance.timeOrigin + now_ms - at_ms, 0);
     return t + rate * since_ms / 1000;
   }

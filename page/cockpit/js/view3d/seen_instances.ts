@@ -4,32 +4,33 @@
 
 import { MergedMesh } from './merged_mesh.js';
 
-/** @import { BufferGeometry, Camera, InstancedBufferAttribute, InstancedMesh } from 'three' */
-/** @import { Color, Material, Matrix4, Mesh } from 'three' */
-/** @typedef {typeof import('./three.js')} Three */
+import type {
+  BufferGeometry, Camera, Color, InstancedBufferAttribute, InstancedMesh, Material, Matrix4, Mesh,
+  Sphere,
+} from 'three';
+import type { Three } from './three.js';
 
 /**
  * The sight of a camera: instances out of sight are not submitted to the renderer, and those that
  * are small in the picture have fewer triangles.
- *
- * @typedef {object} Sight
- * @property {Float64Array} planes six of them, four numbers each: a point within has
- *   a x + b y + c z + d >= 0, from the local origin
- * @property {{x: number, y: number}} eye from the local origin [m]
- * @property {number} plain_m beyond it the plain shape is drawn
- * @property {boolean} own whether the own vehicle is drawn
  */
+export interface Sight {
+  // six of them, four numbers each: a point within has a x + b y + c z + d >= 0, from the local
+  // origin
+  planes: Float64Array;
+  eye: { x: number; y: number }; // from the local origin [m]
+  plain_m: number; // beyond it the plain shape is drawn
+  own: boolean; // whether the own vehicle is drawn
+}
 
 /**
  * Return the sight of a camera.
  *
- * @param {Three} three
- * @param {Camera} camera whose matrices are those of the picture
- * @param {number} plain_m see Sight
- * @param {boolean} own whether the own vehicle is drawn
- * @returns {Sight}
+ * @param camera whose matrices are those of the picture
+ * @param plain_m see Sight
+ * @param own whether the own vehicle is drawn
  */
-export function sightOf(three, camera, plain_m, own) {
+export function sightOf(three: Three, camera: Camera, plain_m: number, own: boolean): Sight {
   const both = new three.Matrix4().multiplyMatrices(camera.projectionMatrix,
     camera.matrixWorldInverse);
   const frustum = new three.Frustum().setFromProjectionMatrix(both);
@@ -41,14 +42,12 @@ export function sightOf(three, camera, plain_m, own) {
 }
 
 /**
- * @param {Float64Array} planes see Sight
- * @param {number} x
- * @param {number} y
- * @param {number} z
- * @param {number} radius [m]
- * @returns {boolean} whether a ball may be visible
+ * @param planes see Sight
+ * @param radius [m]
+ * @returns whether a ball may be visible
  */
-export function isWithin(planes, x, y, z, radius) {
+export function isWithin(planes: Float64Array, x: number, y: number, z: number,
+  radius: number): boolean {
   for (let i = 0; i < 24; i += 4) {
     if (planes[i] * x + planes[i + 1] * y + planes[i + 2] * z + planes[i + 3] < -radius) {
       return false;
@@ -57,30 +56,28 @@ export function isWithin(planes, x, y, z, radius) {
   return true;
 }
 
-/**
- * The shapes of near and far instances, in parts of several materials.
- *
- * @typedef {object} Part
- * @property {BufferGeometry} geometry
- * @property {Material} material
- * @property {boolean} tinted whether each instance has a colour of its own
- */
-/**
- * @typedef {object} Shapes
- * @property {Part[]} near
- * @property {Part[]} [far] the plain ones, of one material; without them the near ones are drawn
- *   at any distance
- * @property {number} [sooner] share of a sight's `plain_m` at which the plain ones begin; with 0
- * all are plain if any is
- */
+/** The shapes of near and far instances, in parts of several materials. */
+export interface Part {
+  geometry: BufferGeometry;
+  material: Material;
+  tinted: boolean; // whether each instance has a colour of its own
+}
+
+export interface Shapes {
+  near: Part[];
+  // the plain ones, of one material; without them the near ones are drawn at any distance
+  far?: Part[];
+  // share of a sight's `plain_m` at which the plain ones begin; with 0 all are plain if any is
+  sooner?: number;
+}
 
 /**
  * Return a shape as a plain one, for things whose number costs more than their triangles.
  *
- * @param {Part} part of a material without vertex colours
- * @returns {Part} whose material has to be freed, too
+ * @param part of a material without vertex colours
+ * @returns whose material has to be freed, too
  */
-export function mergeable({ geometry, material, tinted }) {
+export function mergeable({ geometry, material, tinted }: Part): Part {
   const own = material.clone();
   own.vertexColors = true;
   return { geometry: geometry.clone(), material: own, tinted };
@@ -88,8 +85,7 @@ export function mergeable({ geometry, material, tinted }) {
 
 /** Instances that are added anew whenever they move; `see` chooses among them. */
 export class SeenInstances {
-  /** @type {Mesh[]} those of the near shape, then that of the plain one */
-  meshes;
+  meshes: Mesh[]; // those of the near shape, then that of the plain one
   #near;
   #far;
   #sooner;
@@ -99,12 +95,8 @@ export class SeenInstances {
   #own;
   #count = 0;
 
-  /**
-   * @param {Three} three
-   * @param {Shapes} shapes
-   * @param {number} most how many there can be
-   */
-  constructor(three, { near, far = [], sooner = 1 }, most) {
+  /** @param most how many there can be */
+  constructor(three: Three, { near, far = [], sooner = 1 }: Shapes, most: number) {
     this.#sooner = sooner;
     this.#bound = boundOf(near);
     this.#matrices = new Float32Array(16 * most);
@@ -122,11 +114,10 @@ export class SeenInstances {
   }
 
   /**
-   * @param {Matrix4} matrix
-   * @param {Color|null} color null keeps the colour of the former instance at this index
-   * @param {boolean} own whether it is of the vehicle in which the camera may be
+   * @param color null keeps the colour of the former instance at this index
+   * @param own whether it is of the vehicle in which the camera may be
    */
-  add(matrix, color, own) {
+  add(matrix: Matrix4, color: Color | null, own: boolean) {
     matrix.toArray(this.#matrices, 16 * this.#count);
     color?.toArray(this.#colors, 3 * this.#count);
     this.#own[this.#count] = own ? 1 : 0;
@@ -138,17 +129,12 @@ export class SeenInstances {
     this.#choose(null);
   }
 
-  /**
-   * Submit those that a camera sees.
-   *
-   * @param {Sight} sight
-   */
-  see(sight) {
+  /** Submit those that a camera sees. */
+  see(sight: Sight) {
     this.#choose(sight);
   }
 
-  /** @param {Sight|null} sight */
-  #choose(sight) {
+  #choose(sight: Sight | null) {
     let near = 0;
     this.#far?.begin();
     for (let i = 0; i < this.#count; i += 1) {
@@ -168,11 +154,7 @@ export class SeenInstances {
     this.#far?.end();
   }
 
-  /**
-   * @param {number} i
-   * @param {Sight} sight
-   */
-  #mayBeSeen(i, { planes, own }) {
+  #mayBeSeen(i: number, { planes, own }: Sight) {
     if (this.#own[i] === 1 && !own) {
       return false;
     }
@@ -187,21 +169,12 @@ export class SeenInstances {
       m[o + 2] * x + m[o + 6] * y + m[o + 10] * z + m[o + 14], radius * scale);
   }
 
-  /**
-   * @param {number} i
-   * @param {Sight} sight
-   * @returns {number} from the eye, in the plane [m]
-   */
-  #distance(i, { eye }) {
+  /** @returns from the eye, in the plane [m] */
+  #distance(i: number, { eye }: Sight): number {
     return Math.hypot(this.#matrices[16 * i + 12] - eye.x, this.#matrices[16 * i + 13] - eye.y);
   }
 
-  /**
-   * @param {number} i
-   * @param {Group} group
-   * @param {number} to
-   */
-  #copy(i, { places, colors: { array } }, to) {
+  #copy(i: number, { places, colors: { array } }: Group, to: number) {
     const target = places.array;
     for (let k = 0; k < 16; k += 1) {
       target[16 * to + k] = this.#matrices[16 * i + k];
@@ -222,16 +195,12 @@ export class SeenInstances {
   }
 }
 
-/**
- * @param {Part[]} parts
- * @returns {{x: number, y: number, z: number, radius: number}} a ball around all of them
- */
-function boundOf(parts) {
+/** @returns a ball around all of them */
+function boundOf(parts: Part[]): { x: number; y: number; z: number; radius: number } {
   const bound = { x: 0, y: 0, z: 0, radius: 0 };
   parts.forEach(({ geometry }, i) => {
     geometry.computeBoundingSphere();
-    const { center: { x, y, z }, radius } = /** @type {import('three').Sphere} */ (
-      geometry.boundingSphere);
+    const { center: { x, y, z }, radius } = geometry.boundingSphere as Sphere;
     if (i === 0) {
       Object.assign(bound, { x, y, z });
     }
@@ -241,20 +210,14 @@ function boundOf(parts) {
   return bound;
 }
 
-/**
- * @typedef {object} Group meshes that share places and colours
- * @property {InstancedMesh[]} meshes
- * @property {InstancedBufferAttribute} places
- * @property {InstancedBufferAttribute} colors
- */
+/** Meshes that share places and colours. */
+export interface Group {
+  meshes: InstancedMesh[];
+  places: InstancedBufferAttribute;
+  colors: InstancedBufferAttribute;
+}
 
-/**
- * @param {Three} three
- * @param {Part[]} parts
- * @param {number} most
- * @returns {Group}
- */
-function createGroup(three, parts, most) {
+function createGroup(three: Three, parts: Part[], most: number): Group {
   const places = new three.InstancedBufferAttribute(new Float32Array(16 * Math.max(most, 1)), 16);
   const colors = new three.InstancedBufferAttribute(new Float32Array(3 * Math.max(most, 1)), 3);
   places.setUsage(three.DynamicDrawUsage);
@@ -273,11 +236,7 @@ function createGroup(three, parts, most) {
   return { meshes, places, colors };
 }
 
-/**
- * @param {Group} group
- * @param {number} count
- */
-function handOver({ meshes, places, colors }, count) {
+function handOver({ meshes, places, colors }: Group, count: number) {
   for (const mesh of meshes) {
     mesh.count = count;
     mesh.visible = count > 0;

@@ -11,12 +11,12 @@ const SLOW = 1;
  * Return the steering angle of a single-track model with this motion:
  * tan(angle) = wheelbase * yaw rate / speed.
  *
- * @param {number} wheelbase [m]
- * @param {number} speed along its heading, below 0 backwards [m/s]
- * @param {number} yaw_rate [rad/s]
- * @returns {number} [rad], positive to the left; 0 at standstill
+ * @param wheelbase [m]
+ * @param speed along its heading, below 0 backwards [m/s]
+ * @param yaw_rate [rad/s]
+ * @returns [rad], positive to the left; 0 at standstill
  */
-export function steeringOf(wheelbase, speed, yaw_rate) {
+export function steeringOf(wheelbase: number, speed: number, yaw_rate: number): number {
   if (Math.abs(speed) < Number.EPSILON) {
     return 0;
   }

@@ -3,8 +3,10 @@
 /**
  * The library three.js, which the server has after `crgame page-libraries` has downloaded it.
  *
- * Only view3d.js loads this file, when the 3D view is first shown. All other modules get the
+ * Only view3d.ts loads this file, when the 3D view is first shown. All other modules get the
  * library as an argument, so that they can be loaded and tested without it.
  */
 
 export * from '/three/three.module.js';
+
+export type Three = typeof import('./three.js');

@@ -12,29 +12,28 @@ import { Headlights } from './headlights.js';
 import { Instances } from './instances.js';
 import { steeringOf } from './steering.js';
 
-/** @import { Group } from 'three' */
-/** @import { Scene } from '../messages.js' */
-/** @import { Shown, Store } from '../store.js' */
-/** @import { Appearance } from './bodies/appearance.js' */
-/** @import { Body } from './bodies/motor_vehicles.js' */
-/** @import { Origin } from './local_origin.js' */
-/** @import { Three } from './road/road_world.js' */
-/** @import { Sight } from './seen_instances.js' */
+import type { Group } from 'three';
+import type { Scene } from '../messages.js';
+import type { Shown, Store } from '../store.js';
+import type { Appearance } from './bodies/appearance.js';
+import type { Body } from './bodies/motor_vehicles.js';
+import type { Origin } from './local_origin.js';
+import type { Three } from './three.js';
+import type { Sight } from './seen_instances.js';
 
-/**
- * @typedef {object} Thing
- * @property {string} id
- * @property {Appearance} look
- * @property {Body} body
- * @property {Instances} instances
- * @property {[x: number, y: number, z: number]} scale of the body
- * @property {number} role its colour on the map
- * @property {number} rolled distance of its wheels [m]
- * @property {number} wheelbase of the body as it is scaled; 0 without wheels [m]
- * @property {boolean} parked whether it is parked, without a driver
- */
+export interface Thing {
+  id: string;
+  look: Appearance;
+  body: Body;
+  instances: Instances;
+  scale: [x: number, y: number, z: number]; // of the body
+  role: number; // its colour on the map
+  rolled: number; // distance of its wheels [m]
+  wheelbase: number; // of the body as it is scaled; 0 without wheels [m]
+  parked: boolean; // whether it is parked, without a driver
+}
 
-/** @typedef {(x: number, y: number) => number} HeightAt of the road at a point of the map [m] */
+export type HeightAt = (x: number, y: number) => number; // of the road at a point of the map [m]
 
 /** The bodies of one scene. */
 export class Traffic {
@@ -44,30 +43,24 @@ export class Traffic {
   /** Distances beyond which no body is drawn, and no wheel turns [m]. */
   limits = { farthest_m: 0, wheels_m: 0 };
   #group;
-  /** @type {Thing[]} */
-  #vehicles = [];
-  /** @type {Thing[]} */
-  #objects = [];
-  /** @type {Map<string, Instances>} */
-  #instances = new Map();
+  #vehicles: Thing[] = [];
+  #objects: Thing[] = [];
+  #instances = new Map<string, Instances>();
   #parts;
   #headlights;
   #brakeLights = new BrakeLights();
   #matrix;
   #scaling;
-  /** @type {Origin} */
-  #origin = { x: 0, y: 0 };
-  /** @type {Scene|null} */
-  #scene = null;
+  #origin: Origin = { x: 0, y: 0 };
+  #scene: Scene | null = null;
   #shown_t = NaN;
   #store;
 
   /**
-   * @param {Three} three
-   * @param {Group} group gets everything
-   * @param {Store} store whose scenario steps and signals show which objects brake or indicate
+   * @param group gets everything
+   * @param store whose scenario steps and signals show which objects brake or indicate
    */
-  constructor(three, group, store) {
+  constructor(three: Three, group: Group, store: Store) {
     this.#three = three;
     this.#group = group;
     this.#matrix = new three.Matrix4();
@@ -79,23 +72,20 @@ export class Traffic {
   }
 
   /**
-   * @param {Scene} scene
-   * @param {Origin} origin of the coordinates in the group
-   * @param {(role: string, type: string) => number} colorOf returns its colour on the map
+   * @param origin of the coordinates in the group
+   * @param colorOf returns its colour on the map
    */
-  load(scene, origin, colorOf) {
+  load(scene: Scene, origin: Origin, colorOf: (role: string, type: string) => number) {
     this.#clear();
     this.#scene = scene;
     this.#origin = origin;
     this.#brakeLights.load(scene.objects.length);
-    /** @type {Map<string, {look: Appearance, count: number}>} */
-    const kinds = new Map();
+    const kinds = new Map<string, { look: Appearance; count: number }>();
     const looks = [...scene.vehicles.map(ofVehicle), ...scene.objects.map(ofObject)];
     for (const look of looks) {
       kinds.set(look.key, { look, count: (kinds.get(look.key)?.count ?? 0) + 1 });
     }
-    /** @type {Map<string, Body>} */
-    const bodies = new Map();
+    const bodies = new Map<string, Body>();
     for (const [key, { look, count }] of kinds) {
       const body = look.build();
       bodies.set(key, body);
@@ -105,7 +95,7 @@ export class Traffic {
     const things = looks.map((look, i) => {
       const vehicle = scene.vehicles[i];
       const object = scene.objects[i - scene.vehicles.length];
-      return this.#thing(look, /** @type {Body} */ (bodies.get(look.key)),
+      return this.#thing(look, bodies.get(look.key) as Body,
         vehicle?.id ?? object.id, vehicle ? colorOf(vehicle.role, vehicle.type)
           : colorOf(object.role, object.type));
     });
@@ -121,12 +111,10 @@ export class Traffic {
   /**
    * Place all bodies at their current poses.
    *
-   * @param {Shown} shown
-   * @param {string|null} own id of the vehicle in which the camera may be
-   * @param {HeightAt} heightAt
-   * @param {{x: number, y: number}} eye of the camera, in the group's coordinates
+   * @param own id of the vehicle in which the camera may be
+   * @param eye of the camera, in the group's coordinates
    */
-  update(shown, own, heightAt, eye) {
+  update(shown: Shown, own: string | null, heightAt: HeightAt, eye: { x: number; y: number }) {
     const scene = this.#scene;
     if (scene === null) {
       return;
@@ -161,8 +149,8 @@ export class Traffic {
     }
   }
 
-  /** @param {Sight} sight of the camera that draws next */
-  see(sight) {
+  /** @param sight of the camera that draws next */
+  see(sight: Sight) {
     for (const instances of this.#instances.values()) {
       instances.see(sight);
     }
@@ -171,15 +159,15 @@ export class Traffic {
   }
 
   /**
-   * @param {string} id of a driven vehicle
-   * @returns {number} its colour, which does not depend on its driver
+   * @param id of a driven vehicle
+   * @returns its colour, which does not depend on its driver
    */
-  paintOf(id) {
+  paintOf(id: string): number {
     return this.#vehicles.find((thing) => thing.id === id)?.look.paint ?? 0;
   }
 
-  /** @param {number} t simulation time that is shown [s] */
-  #elapsed(t) {
+  /** @param t simulation time that is shown [s] */
+  #elapsed(t: number) {
     const dt = t - this.#shown_t;
     this.#shown_t = t;
     return Number.isFinite(dt) && Math.abs(dt) < 1 ? dt : 0;
@@ -192,31 +180,22 @@ export class Traffic {
     this.#instances.clear();
   }
 
-  /**
-   * @param {Appearance} look
-   * @param {Body} body
-   * @param {string} id
-   * @param {number} role
-   * @returns {Thing}
-   */
-  #thing(look, body, id, role) {
+  #thing(look: Appearance, body: Body, id: string, role: number): Thing {
     const along = (look.length ?? body.length) / body.length;
     return {
       id, look, body, role, rolled: 0, parked: false,
-      instances: /** @type {Instances} */ (this.#instances.get(look.key)),
+      instances: this.#instances.get(look.key) as Instances,
       scale: [along, (look.width ?? body.width) / body.width,
         (look.height ?? body.height) / body.height],
       wheelbase: body.wheels === null ? 0 : along * (body.wheels.front - body.wheels.rear),
     };
   }
 
-  /**
-   * @param {Thing} thing
-   * @param {{x: number, y: number, yaw: number, speed: number, steering: number, dt: number,
-   *   brakes: boolean, lights: number, own: boolean, heightAt: HeightAt,
-   *   eye: {x: number, y: number}}} state of its middle, in the map's coordinates
-   */
-  #place(thing, { x, y, yaw, speed, steering, dt, brakes, lights, own, heightAt, eye }) {
+  /** @param state of its middle, in the map's coordinates */
+  #place(thing: Thing,
+    { x, y, yaw, speed, steering, dt, brakes, lights, own, heightAt, eye }: { x: number; y: number;
+    yaw: number; speed: number; steering: number; dt: number; brakes: boolean; lights: number;
+    own: boolean; heightAt: HeightAt; eye: { x: number; y: number } }) {
     const px = x - this.#origin.x;
     const py = y - this.#origin.y;
     // An absent thing has no place.
@@ -252,14 +231,14 @@ export class Traffic {
 /**
  * Return the height of the road midway between two points along the heading, and the slope.
  *
- * @param {number} x [m]
- * @param {number} y [m]
- * @param {number} yaw [rad]
- * @param {number} reach of the points from the middle [m]
- * @param {HeightAt} heightAt
- * @returns {{z: number, slope: number}} [m], [rad] upwards
+ * @param x [m]
+ * @param y [m]
+ * @param yaw [rad]
+ * @param reach of the points from the middle [m]
+ * @returns [m], [rad] upwards
  */
-export function poseOf(x, y, yaw, reach, heightAt) {
+export function poseOf(x: number, y: number, yaw: number, reach: number,
+  heightAt: HeightAt): { z: number; slope: number } {
   const dx = reach * Math.cos(yaw);
   const dy = reach * Math.sin(yaw);
   const front = heightAt(x + dx, y + dy);

@@ -5,21 +5,19 @@
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { poseOf } from './traffic.js';
 
-/** @import { SceneVehicle } from '../messages.js' */
-/** @import { Shown } from '../store.js' */
-/** @import { Stand } from './cameras.js' */
-/** @import { HeightAt } from './traffic.js' */
+import type { SceneVehicle } from '../messages.js';
+import type { Shown } from '../store.js';
+import type { Stand } from './cameras.js';
+import type { HeightAt } from './traffic.js';
 
 /**
  * Return the pose of a vehicle's rear axle on the road, and the slope.
  *
- * @param {Shown} shown
- * @param {number} index of the vehicle
- * @param {SceneVehicle} vehicle
- * @param {HeightAt} heightAt
- * @returns {Stand|null} null while it has no place
+ * @param index of the vehicle
+ * @returns null while it has no place
  */
-export function standOf(shown, index, vehicle, heightAt) {
+export function standOf(shown: Shown, index: number, vehicle: SceneVehicle,
+  heightAt: HeightAt): Stand | null {
   const row = index * VEHICLE_WIDTH;
   const [x, y] = [shown.vehicles[row], shown.vehicles[row + 1]];
   const yaw = shown.vehicles[row + VEHICLE.yaw];

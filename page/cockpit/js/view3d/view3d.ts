@@ -12,8 +12,8 @@ import { createViewButtons } from './view_buttons.js';
 import { ViewSettings } from './view_settings.js';
 import { readViewWindow } from './view_window.js';
 
-/** @import { Store } from '../store.js' */
-/** @import { Looks, Picture } from './picture.js' */
+import type { Store } from '../store.js';
+import type { Looks, Picture } from './picture.js';
 
 const MISSING = 'The 3D view needs three.js, which the server does not have: '
   + '`crgame page-libraries` fetches it.';
@@ -25,8 +25,7 @@ const EARLY_MS = 4;
 
 /** The 3D view of a page. */
 export class View3d {
-  /** @type {Picture|null} */
-  picture = null;
+  picture: Picture | null = null;
   settings;
   /** The settings of a window with only the view; null in a page with map and panels. */
   window = readViewWindow(window.location.search);
@@ -47,11 +46,7 @@ export class View3d {
   #answer = new KeyAnswer();
   #wasLost = false;
 
-  /**
-   * @param {HTMLElement} stage
-   * @param {Store} store
-   */
-  constructor(stage, store) {
+  constructor(stage: HTMLElement, store: Store) {
     this.#stage = stage;
     this.#store = store;
     this.#clock = new SeatClock(store, this.window !== null,
@@ -64,12 +59,12 @@ export class View3d {
     });
     this.redraw();
     window.addEventListener('keydown', (event) => this.#pressed(event));
-    for (const name of /** @type {const} */ (['keydown', 'keyup'])) {
+    for (const name of ['keydown', 'keyup'] as const) {
       // Driving stops its keys from propagating, so they are captured earlier.
       window.addEventListener(name, (event) => this.#awaitAnswer(event), true);
     }
     new ResizeObserver(() => this.#resize()).observe(stage);
-    for (const name of /** @type {const} */ (['scene', 'epoch', 'plan', 'state', 'signals'])) {
+    for (const name of ['scene', 'epoch', 'plan', 'state', 'signals'] as const) {
       store.on(name, () => { this.#due = PICTURES_AFTER_CHANGE; });
     }
     if (this.window !== null) {
@@ -110,10 +105,9 @@ export class View3d {
   /**
    * Show the 3D view or the map.
    *
-   * @param {boolean} on
-   * @returns {Promise<boolean>} whether it is shown: it needs three.js and WebGL 2
+   * @returns whether it is shown: it needs three.js and WebGL 2
    */
-  async show(on) {
+  async show(on: boolean): Promise<boolean> {
     this.#on = on && await this.#load();
     this.#canvas.hidden = !this.#on;
     this.redraw();
@@ -133,9 +127,9 @@ export class View3d {
   /**
    * Draw once more and return it as PNG, because the browser discards the drawing after a frame.
    *
-   * @returns {Promise<Blob|null>} null while nothing can be seen
+   * @returns null while nothing can be seen
    */
-  async snapshot() {
+  async snapshot(): Promise<Blob | null> {
     const now_ms = performance.now();
     const shown = this.#on ? this.#store.displayed(now_ms) : null;
     if (shown === null || !this.picture?.draw(shown, now_ms, this.#view(this.vehicle))) {
@@ -164,8 +158,7 @@ export class View3d {
     if (this.picture !== null) {
       return true;
     }
-    /** @type {typeof import('./three.js')} */
-    let three;
+    let three: typeof import('./three.js');
     try {
       three = await import('./three.js');
     } catch {
@@ -183,13 +176,11 @@ export class View3d {
     }
   }
 
-  /** @param {string} text */
-  #notify(text) {
+  #notify(text: string) {
     this.#store.receive({ type: 'notice', level: 'warn', text });
   }
 
-  /** @param {KeyboardEvent} event */
-  #pressed(event) {
+  #pressed(event: KeyboardEvent) {
     if (!this.keys || event.ctrlKey || event.metaKey || event.altKey || event.repeat
         || isTyping(event.target)) {
       return;
@@ -202,8 +193,7 @@ export class View3d {
     }
   }
 
-  /** @param {KeyboardEvent} event */
-  #awaitAnswer(event) {
+  #awaitAnswer(event: KeyboardEvent) {
     const newest = this.#store.latest;
     if (!event.repeat && newest !== undefined && window.crgame.driving?.seat
         && !isTyping(event.target)) {
@@ -218,8 +208,7 @@ export class View3d {
     }
   }
 
-  /** @param {number} now_ms */
-  #animate(now_ms) {
+  #animate(now_ms: number) {
     if (!this.#on || this.picture === null) {
       return;
     }
@@ -245,11 +234,7 @@ export class View3d {
     }
   }
 
-  /**
-   * @param {string|null} vehicle
-   * @returns {Looks}
-   */
-  #view(vehicle) {
+  #view(vehicle: string | null): Looks {
     const { clientWidth: width, clientHeight: height } = this.#stage;
     const { seat, fieldOfView_deg, switches } = this.settings;
     const across = acrossAngle(this.window?.fieldOfView_deg ? null : seat,
@@ -261,8 +246,7 @@ export class View3d {
     };
   }
 
-  /** @param {Picture} picture */
-  #notifyLoss(picture) {
+  #notifyLoss(picture: Picture) {
     if (picture.lost !== this.#wasLost) {
       this.#wasLost = picture.lost;
       if (picture.lost) {
@@ -277,10 +261,9 @@ export class View3d {
 /**
  * Put the 3D view beside the map.
  *
- * @param {HTMLElement} root the stage, which holds the map
- * @param {Store} store what is shown
- * @returns {View3d}
+ * @param root the stage, which holds the map
+ * @param store what is shown
  */
-export function createView3d(root, store) {
+export function createView3d(root: HTMLElement, store: Store): View3d {
   return new View3d(root, store);
 }

@@ -6,12 +6,11 @@ import { element, setAttribute } from '../dom.js';
 import { recall, remember } from '../panels/memory.js';
 import { FIELD_OF_VIEW, readSeat } from './field_of_view.js';
 
-/** @import { Seat } from './field_of_view.js' */
+import type { Seat } from './field_of_view.js';
 
-/** @typedef {'mirrors'|'inset'|'plans'|'sharp'} Switch */
+export type Switch = 'mirrors' | 'inset' | 'plans' | 'sharp';
 
-/** @type {{name: Switch, text: string, on: boolean}[]} */
-const SWITCHES = [
+const SWITCHES: { name: Switch; text: string; on: boolean }[] = [
   { name: 'mirrors', text: 'Mirrors', on: true },
   { name: 'inset', text: 'Small map', on: true },
   // A driver could not see what an AV plans or perceives.
@@ -21,11 +20,9 @@ const SWITCHES = [
 
 /** The settings and their form. */
 export class ViewSettings {
-  /** @type {Record<Switch, boolean>} */
-  switches = { mirrors: true, inset: true, plans: false, sharp: false };
+  switches: Record<Switch, boolean> = { mirrors: true, inset: true, plans: false, sharp: false };
   fieldOfView_deg = FIELD_OF_VIEW.usual;
-  /** @type {Seat|null} */
-  seat = null;
+  seat: Seat | null = null;
   node;
   #changed;
   #angle = element('input', { type: 'range', min: FIELD_OF_VIEW.least, max: FIELD_OF_VIEW.most,
@@ -35,8 +32,8 @@ export class ViewSettings {
   #width = centimetres('Width of the screen', () => this.#read());
   #distance = centimetres('Eyes from the screen', () => this.#read());
 
-  /** @param {() => void} changed called after each choice */
-  constructor(changed) {
+  /** @param changed called after each choice */
+  constructor(changed: () => void) {
     this.#changed = changed;
     this.#angle.value = recall('view3d-angle') || String(FIELD_OF_VIEW.usual);
     this.#isTrue.checked = recall('view3d-true') === '1';
@@ -52,16 +49,12 @@ export class ViewSettings {
     this.#read();
   }
 
-  /** @param {boolean} open whether the form is visible */
-  open(open) {
+  /** @param open whether the form is visible */
+  open(open: boolean) {
     setAttribute(this.node, 'hidden', !open);
   }
 
-  /**
-   * @param {Switch} name
-   * @param {boolean} on
-   */
-  set(name, on) {
+  set(name: Switch, on: boolean) {
     this.switches[name] = on;
     const input = this.node.querySelector(`[name=${name}]`);
     if (input instanceof HTMLInputElement) {
@@ -74,10 +67,9 @@ export class ViewSettings {
   /**
    * Choose for this page only: the browser does not remember it.
    *
-   * @param {Record<Switch, boolean>} switches
-   * @param {number|null} fieldOfView_deg null leaves it as it is [deg]
+   * @param fieldOfView_deg null leaves it as it is [deg]
    */
-  fix(switches, fieldOfView_deg) {
+  fix(switches: Record<Switch, boolean>, fieldOfView_deg: number | null) {
     this.switches = { ...switches };
     if (fieldOfView_deg !== null) {
       this.fieldOfView_deg = fieldOfView_deg;
@@ -86,8 +78,7 @@ export class ViewSettings {
     this.#changed();
   }
 
-  /** @param {typeof SWITCHES[number]} item */
-  #switch({ name, text, on }) {
+  #switch({ name, text, on }: typeof SWITCHES[number]) {
     const input = element('input', { type: 'checkbox', name,
       on: { change: () => this.set(name, input.checked) } });
     input.checked = recall(`view3d-${name}`) === '' ? on : recall(`view3d-${name}`) === '1';
@@ -114,11 +105,7 @@ export class ViewSettings {
   }
 }
 
-/**
- * @param {string} text
- * @param {() => void} changed
- */
-function centimetres(text, changed) {
+function centimetres(text: string, changed: () => void) {
   const input = element('input', { type: 'number', min: 5, max: 2000, step: 'any',
     inputmode: 'decimal', on: { input: changed } });
   return { input, label: element('label', {}, element('span', { text }), input,

@@ -5,27 +5,25 @@
 import { VIEWPOINTS } from './cameras.js';
 import { FIELD_OF_VIEW } from './field_of_view.js';
 
-/** @import { Viewpoint } from './cameras.js' */
+import type { Viewpoint } from './cameras.js';
 
 const DEGREE = Math.PI / 180;
 
-/**
- * The settings of a window.
- *
- * @typedef {object} ViewWindow
- * @property {Viewpoint} viewpoint
- * @property {number} aside to the left of straight ahead [rad]
- * @property {string|null} vehicle id; null for the vehicle of the seat's first window
- * @property {number|null} fieldOfView_deg across the window; null for the common setting [deg]
- */
+/** The settings of a window. */
+export interface ViewWindow {
+  viewpoint: Viewpoint;
+  aside: number; // to the left of straight ahead [rad]
+  vehicle: string | null; // id; null for the vehicle of the seat's first window
+  fieldOfView_deg: number | null; // across the window; null for the common setting [deg]
+}
 
 /**
  * Read a page's address.
  *
- * @param {string} query `?view=driver&yaw=-60`, degrees to the left; `vehicle` and `fov` besides
- * @returns {ViewWindow|null} null for a page with map and panels
+ * @param query `?view=driver&yaw=-60`, degrees to the left; `vehicle` and `fov` besides
+ * @returns null for a page with map and panels
  */
-export function readViewWindow(query) {
+export function readViewWindow(query: string): ViewWindow | null {
   const values = new URLSearchParams(query);
   const viewpoint = VIEWPOINTS.find((name) => name === values.get('view'));
   if (viewpoint === undefined || values.has('stage')) {

@@ -8,7 +8,7 @@ import { icon } from '../panels/icons.js';
 import { recall, remember } from '../panels/memory.js';
 import { driverSight } from './driver_sight.js';
 
-/** @import { Shown, Store } from '../store.js' */
+import type { Shown, Store } from '../store.js';
 
 const EVERY_MS = 1000;
 // Objects farther away are left out [m].
@@ -18,18 +18,17 @@ const KMH = 3.6;
 const OBJECT_WIDTH = 6;
 const STANDING = 0.3;
 
-/** @typedef {{id: string, x: number, y: number, yaw: number, speed: number}} Body [m, rad, m/s] */
+// [m, rad, m/s]
+export interface Body { id: string; x: number; y: number; yaw: number; speed: number }
 
 /**
  * Describe the objects around a vehicle, the nearest first.
  *
- * @param {Body} own
- * @param {Body[]} others
- * @param {boolean} driven whether this page drives it
- * @param {number} [range] visibility [m]
- * @returns {string}
+ * @param driven whether this page drives it
+ * @param range visibility [m]
  */
-export function describeAround(own, others, driven, range = Infinity) {
+export function describeAround(own: Body, others: Body[], driven: boolean,
+  range = Infinity): string {
   const reach = Math.min(REACH, range);
   const near = others.map((other) => ({
     other, distance: Math.hypot(other.x - own.x, other.y - own.y) }))
@@ -42,19 +41,14 @@ export function describeAround(own, others, driven, range = Infinity) {
       : `Around: ${told.join('; ')}${more > 0 ? `; and ${more} more` : ''}.`].join(' ');
 }
 
-/** @param {number} speed [m/s] */
-function pace(speed) {
+/** @param speed [m/s] */
+function pace(speed: number) {
   return Math.abs(speed) < STANDING ? 'standing'
     : `${Math.round(Math.abs(speed) * KMH)} km/h${speed < 0 ? ' backwards' : ''}`;
 }
 
-/**
- * Return one of eight directions, as seen by the driver.
- *
- * @param {Body} own
- * @param {Body} other
- */
-function directionOf(own, other) {
+/** Return one of eight directions, as seen by the driver. */
+function directionOf(own: Body, other: Body) {
   const angle = Math.atan2(other.y - own.y, other.x - own.x) - own.yaw;
   const eighth = Math.round(angle / (Math.PI / 4)) & 7;
   return ['ahead', 'ahead left', 'left', 'behind left', 'behind', 'behind right', 'right',
@@ -64,11 +58,9 @@ function directionOf(own, other) {
 /**
  * Keep the text up to date, once a second at most; it is read out only on request.
  *
- * @param {HTMLElement} root #around
- * @param {Store} store
- * @returns {{describe: () => string}}
+ * @param root #around
  */
-export function createAround(root, store) {
+export function createAround(root: HTMLElement, store: Store): { describe: () => string } {
   const describe = () => {
     const seat = window.crgame.driving?.seat ?? null;
     const id = seat ?? window.crgame.world.followed;
@@ -83,8 +75,7 @@ export function createAround(root, store) {
     'aria-label': 'Read out what is around', title: 'Read out what is around', on: {
       click: () => announce(root.getAttribute('aria-live') !== 'polite'),
     } }, icon('speech'));
-  /** @param {boolean} on */
-  const announce = (on) => {
+  const announce = (on: boolean) => {
     root.setAttribute('aria-live', on ? 'polite' : 'off');
     button.setAttribute('aria-pressed', String(on));
     remember('announce', on ? 'yes' : '');
@@ -99,12 +90,8 @@ export function createAround(root, store) {
   return { describe };
 }
 
-/**
- * @param {Store} store
- * @param {Shown} shown
- * @returns {Body[]} the present bodies
- */
-function bodiesOf({ scene }, { vehicles, objects }) {
+/** @returns the present bodies */
+function bodiesOf({ scene }: Store, { vehicles, objects }: Shown): Body[] {
   const driven = (scene?.vehicles ?? []).map(({ id }, i) => {
     const row = vehicles.subarray(i * VEHICLE_WIDTH, (i + 1) * VEHICLE_WIDTH);
     return { id, x: row[VEHICLE.x], y: row[VEHICLE.y], yaw: row[VEHICLE.yaw],

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The boundary lines of all lanelets, each once, although two neighbours describe it. */
 
-/** @import { Lanelet } from '../messages.js' */
+import type { Lanelet } from '../messages.js';
 
 // Neighbours' bounds are the same line when their ends are this close [m].
 const SAME_M = 0.3;
@@ -13,28 +13,24 @@ const RANK = [
   'dashed_solid', 'solid_dashed', 'solid_solid', 'broad_dashed', 'broad_solid',
 ];
 
-/**
- * @typedef {object} Boundary
- * @property {number[]} line flat
- * @property {string} marking CommonRoad's name
- * @property {number} owner index of its lanelet
- * @property {boolean} inner between two lanelets
- */
+export interface Boundary {
+  line: number[]; // flat
+  marking: string; // CommonRoad's name
+  owner: number; // index of its lanelet
+  inner: boolean; // between two lanelets
+}
 
 /**
  * Collect the boundaries of a scene.
  *
- * @param {Lanelet[]} lanelets of the scene document
- * @returns {Boundary[]}
+ * @param lanelets of the scene document
  */
-export function collectBoundaries(lanelets) {
+export function collectBoundaries(lanelets: Lanelet[]): Boundary[] {
   const index = new Map(lanelets.map((lanelet, i) => [lanelet.id, i]));
-  /** @type {Map<string, Boundary>} */
-  const drawn = new Map();
-  /** @type {Boundary[]} */
-  const boundaries = [];
+  const drawn = new Map<string, Boundary>();
+  const boundaries: Boundary[] = [];
   lanelets.forEach((lanelet, owner) => {
-    for (const side of /** @type {const} */ (['left', 'right'])) {
+    for (const side of ['left', 'right'] as const) {
       const neighbour = index.get(lanelet[`adj_${side}`] ?? NaN);
       const shared = neighbour === undefined ? undefined
         : drawn.get(`${neighbour} ${sideOfNeighbour(lanelet, side)}`);
@@ -54,31 +50,19 @@ export function collectBoundaries(lanelets) {
   return boundaries;
 }
 
-/**
- * @param {Lanelet} lanelet
- * @param {'left'|'right'} side
- */
-function sideOfNeighbour(lanelet, side) {
+function sideOfNeighbour(lanelet: Lanelet, side: 'left' | 'right') {
   const other = side === 'left' ? 'right' : 'left';
   return lanelet[`adj_${side}_same`] ? other : side;
 }
 
-/**
- * @param {number[]} one
- * @param {number[]} two
- */
-function sameLine(one, two) {
+function sameLine(one: number[], two: number[]) {
   const end = one.length - 2;
   const last = two.length - 2;
-  /** @type {(i: number, j: number) => boolean} */
-  const near = (i, j) => Math.hypot(one[i] - two[j], one[i + 1] - two[j + 1]) < SAME_M;
+  const near = (i: number,
+    j: number): boolean => Math.hypot(one[i] - two[j], one[i + 1] - two[j + 1]) < SAME_M;
   return (near(0, 0) && near(end, last)) || (near(0, last) && near(end, 0));
 }
 
-/**
- * @param {string} one
- * @param {string} two
- */
-function moreVisible(one, two) {
+function moreVisible(one: string, two: string) {
   return RANK.indexOf(two) > RANK.indexOf(one) ? two : one;
 }

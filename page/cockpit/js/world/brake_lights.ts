@@ -4,7 +4,7 @@
 
 import { OBJECT_WIDTH, VEHICLE } from '../frames.js';
 
-/** @import { ObjectsFrame } from '../frames.js' */
+import type { ObjectsFrame } from '../frames.js';
 
 const BRAKE_PEDAL = 0.02;
 // Without a known pedal: the deceleration by which brake lights go on [m/s^2].
@@ -14,11 +14,10 @@ const STANDING = 0.1;
 /** The brake lights of a scene. */
 export class BrakeLights {
   #objects = new Uint8Array(0);
-  /** @type {Pick<ObjectsFrame, 'k'|'t'|'objects'>|null} */
-  #lastStep = null;
+  #lastStep: Pick<ObjectsFrame, 'k' | 't' | 'objects'> | null = null;
 
-  /** @param {number} count of objects in the scene */
-  load(count) {
+  /** @param count of objects in the scene */
+  load(count: number) {
     this.#objects = new Uint8Array(count);
     this.#lastStep = null;
   }
@@ -26,9 +25,9 @@ export class BrakeLights {
   /**
    * Update from a scenario step which objects slow down.
    *
-   * @param {Pick<ObjectsFrame, 'k'|'t'|'objects'>} step as received by the store
+   * @param step as received by the store
    */
-  update(step) {
+  update(step: Pick<ObjectsFrame, 'k' | 't' | 'objects'>) {
     const last = this.#lastStep;
     this.#lastStep = step;
     if (last === null || step.k <= last.k || last.objects.length !== step.objects.length) {
@@ -42,19 +41,19 @@ export class BrakeLights {
   }
 
   /**
-   * @param {number} index of an object
-   * @returns {boolean} whether its brake lights are on
+   * @param index of an object
+   * @returns whether its brake lights are on
    */
-  ofObject(index) {
+  ofObject(index: number): boolean {
     return this.#objects[index] === 1;
   }
 
   /**
-   * @param {Float64Array} rows of a STATE frame
-   * @param {number} row where the driven vehicle's begins
-   * @returns {boolean} whether its brake lights are on
+   * @param rows of a STATE frame
+   * @param row where the driven vehicle's begins
+   * @returns whether its brake lights are on
    */
-  ofVehicle(rows, row) {
+  ofVehicle(rows: Float64Array, row: number): boolean {
     const pedal = rows[row + VEHICLE.brake];
     if (!Number.isNaN(pedal)) {
       return pedal > BRAKE_PEDAL;
@@ -65,10 +64,6 @@ export class BrakeLights {
   }
 }
 
-/**
- * @param {Float64Array} rows
- * @param {number} index
- */
-function speedOf(rows, index) {
+function speedOf(rows: Float64Array, index: number) {
   return Math.hypot(rows[index * OBJECT_WIDTH + 3], rows[index * OBJECT_WIDTH + 4]);
 }

@@ -4,7 +4,7 @@
 
 import { turn } from '../interpolation.js';
 
-/** @import { Box, Pose } from '../messages.js' */
+import type { Box, Pose } from '../messages.js';
 
 const NORTH = Math.PI / 2;
 const MIN_SCALE = 0.02;
@@ -19,7 +19,7 @@ const MIDDLE = 0.5;
 const FOLLOW_HEIGHT = 70;
 const FOLLOW_TIME = 2.8;
 
-/** @typedef {{x: number, y: number, scale: number, up: number, down: number}} Aim */
+export interface Aim { x: number; y: number; scale: number; up: number; down: number }
 
 /** Map frame (m, y up) <-> canvas (CSS pixels, y down). */
 export class Camera {
@@ -45,8 +45,7 @@ export class Camera {
   right = 0;
   top = 0;
 
-  /** @type {Aim} */
-  #aim = { x: 0, y: 0, scale: 4, up: NORTH, down: MIDDLE };
+  #aim: Aim = { x: 0, y: 0, scale: 4, up: NORTH, down: MIDDLE };
   #slack = { x: 0, y: 0, scale: 0, up: 0, down: 0 };
   #updated_ms = NaN;
   #still = window.matchMedia('(prefers-reduced-motion: reduce)');
@@ -69,12 +68,8 @@ export class Camera {
   /**
    * Set the canvas's size, and how much of it is covered from below [CSS px]. The map stays where
    * it is on the canvas; a followed vehicle moves to its new place.
-   *
-   * @param {number} width
-   * @param {number} height
-   * @param {number} [covered]
    */
-  resize(width, height, covered = 0) {
+  resize(width: number, height: number, covered = 0) {
     const [x, y] = this.toMap(this.width / 2, 0);
     this.covered = covered;
     this.width = Math.max(width, 1);
@@ -88,9 +83,9 @@ export class Camera {
   /**
    * Move on towards the target.
    *
-   * @param {number} now_ms the animation frame's time
+   * @param now_ms the animation frame's time
    */
-  update(now_ms) {
+  update(now_ms: number) {
     const elapsed_ms = Math.max(now_ms - (this.#updated_ms || now_ms), 0);
     this.#updated_ms = now_ms;
     const left = Math.exp(-elapsed_ms / SETTLE_MS);
@@ -103,13 +98,8 @@ export class Camera {
     this.#apply();
   }
 
-  /**
-   * Show a box [xmin, ymin, xmax, ymax] of the map entirely; north up.
-   *
-   * @param {Box} bounds
-   * @param {boolean} [animated]
-   */
-  fit(bounds, animated = true) {
+  /** Show a box [xmin, ymin, xmax, ymax] of the map entirely; north up. */
+  fit(bounds: Box, animated = true) {
     const [xmin, ymin, xmax, ymax] = bounds;
     this.headingUp = false;
     this.#send({
@@ -119,26 +109,21 @@ export class Camera {
     }, animated);
   }
 
-  /**
-   * Show a point of the map at a driver's scale.
-   *
-   * @param {number} x
-   * @param {number} y
-   * @param {boolean} [animated]
-   */
-  lookAt(x, y, animated = true) {
+  /** Show a point of the map at a driver's scale. */
+  lookAt(x: number, y: number, animated = true) {
     this.#send({ x, y, down: MIDDLE, scale: this.#driverScale() }, animated);
   }
 
   /**
    * Start following a vehicle; call `track` in each frame from then on.
    *
-   * @param {Pose} pose where it is
-   * @param {boolean} headingUp whether the map turns with it
-   * @param {boolean} zoomed choose the scale anew
-   * @param {boolean} animated move gradually
+   * @param pose where it is
+   * @param headingUp whether the map turns with it
+   * @param zoomed choose the scale anew
+   * @param animated move gradually
    */
-  beginFollowing({ x, y, yaw, speed }, headingUp, zoomed, animated) {
+  beginFollowing({ x, y, yaw, speed }: Pose, headingUp: boolean, zoomed: boolean,
+    animated: boolean) {
     this.headingUp = headingUp;
     this.#send({
       x, y, up: headingUp ? yaw : NORTH, down: headingUp ? FOLLOW_DOWN : MIDDLE,
@@ -146,14 +131,8 @@ export class Camera {
     }, animated);
   }
 
-  /**
-   * Keep a followed vehicle at the anchor.
-   *
-   * @param {number} x
-   * @param {number} y
-   * @param {number} yaw
-   */
-  track(x, y, yaw) {
+  /** Keep a followed vehicle at the anchor. */
+  track(x: number, y: number, yaw: number) {
     this.#aim.x = x;
     this.#aim.y = y;
     if (this.headingUp) {
@@ -161,15 +140,8 @@ export class Camera {
     }
   }
 
-  /**
-   * Zoom by a factor about a point of the canvas [px], the anchor by default.
-   *
-   * @param {number} factor
-   * @param {number} [px]
-   * @param {number} [py]
-   * @param {boolean} [animated]
-   */
-  zoom(factor, px = this.anchorX, py = this.anchorY, animated = false) {
+  /** Zoom by a factor about a point of the canvas [px], the anchor by default. */
+  zoom(factor: number, px = this.anchorX, py = this.anchorY, animated = false) {
     const scale = clamp(this.#aim.scale * factor, MIN_SCALE, MAX_SCALE);
     const [x, y] = this.toMap(px, py);
     const kept = this.#aim.scale / scale;
@@ -178,13 +150,8 @@ export class Camera {
     }, animated);
   }
 
-  /**
-   * Drag the map [px].
-   *
-   * @param {number} dx
-   * @param {number} dy
-   */
-  pan(dx, dy) {
+  /** Drag the map [px]. */
+  pan(dx: number, dy: number) {
     const sin = Math.sin(this.up);
     const cos = Math.cos(this.up);
     this.#aim.x -= (dx * sin - dy * cos) / this.scale;
@@ -192,15 +159,8 @@ export class Camera {
     this.#apply();
   }
 
-  /**
-   * Turn the map about a point of the canvas, counter-clockwise on the screen [rad].
-   *
-   * @param {number} angle
-   * @param {number} [px]
-   * @param {number} [py]
-   * @param {boolean} [animated]
-   */
-  rotate(angle, px = this.anchorX, py = this.anchorY, animated = false) {
+  /** Turn the map about a point of the canvas, counter-clockwise on the screen [rad]. */
+  rotate(angle: number, px = this.anchorX, py = this.anchorY, animated = false) {
     this.headingUp = false;
     const [x, y] = this.toMap(px, py);
     const cos = Math.cos(-angle);
@@ -218,33 +178,18 @@ export class Camera {
     this.#send({ up: NORTH, down: MIDDLE }, true);
   }
 
-  /**
-   * Canvas x of a point of the map [px].
-   *
-   * @param {number} x
-   * @param {number} y
-   */
-  toX(x, y) {
+  /** Canvas x of a point of the map [px]. */
+  toX(x: number, y: number) {
     return this.anchorX + this.a * (x - this.x) + this.c * (y - this.y);
   }
 
-  /**
-   * Canvas y of a point of the map [px].
-   *
-   * @param {number} x
-   * @param {number} y
-   */
-  toY(x, y) {
+  /** Canvas y of a point of the map [px]. */
+  toY(x: number, y: number) {
     return this.anchorY + this.b * (x - this.x) + this.d * (y - this.y);
   }
 
-  /**
-   * Point of the map [m] under a point of the canvas [px], in a new array.
-   *
-   * @param {number} px
-   * @param {number} py
-   */
-  toMap(px, py) {
+  /** Point of the map [m] under a point of the canvas [px], in a new array. */
+  toMap(px: number, py: number) {
     const dx = (px - this.anchorX) / this.scale;
     const dy = (py - this.anchorY) / this.scale;
     const sin = Math.sin(this.up);
@@ -252,53 +197,27 @@ export class Camera {
     return [this.x + dx * sin - dy * cos, this.y - dx * cos - dy * sin];
   }
 
-  /**
-   * Return whether a box [xmin, ymin, xmax, ymax] of the map, or part of it, may be visible.
-   *
-   * @param {Box} box
-   */
-  seesBox(box) {
+  /** Return whether a box [xmin, ymin, xmax, ymax] of the map, or part of it, may be visible. */
+  seesBox(box: Box) {
     return box[2] >= this.left && box[0] <= this.right
       && box[3] >= this.bottom && box[1] <= this.top;
   }
 
-  /**
-   * Return whether something within a radius [m] of a point may be visible; false for NaN.
-   *
-   * @param {number} x
-   * @param {number} y
-   * @param {number} radius
-   */
-  sees(x, y, radius) {
+  /** Return whether something within a radius [m] of a point may be visible; false for NaN. */
+  sees(x: number, y: number, radius: number) {
     return x >= this.left - radius && x <= this.right + radius
       && y >= this.bottom - radius && y <= this.top + radius;
   }
 
-  /**
-   * Set a context to metres around a point of the map, exact at any distance from the origin.
-   *
-   * @param {CanvasRenderingContext2D} context
-   * @param {number} ratio
-   * @param {number} [x]
-   * @param {number} [y]
-   */
-  enterMap(context, ratio, x = this.x, y = this.y) {
+  /** Set a context to metres around a point of the map, exact at any distance from the origin. */
+  enterMap(context: CanvasRenderingContext2D, ratio: number, x = this.x, y = this.y) {
     context.setTransform(ratio * this.a, ratio * this.b, ratio * this.c, ratio * this.d,
       ratio * this.toX(x, y), ratio * this.toY(x, y));
   }
 
-  /**
-   * Set a context to metres at a pose, x forward; enlarged, and shifted down [px].
-   *
-   * @param {CanvasRenderingContext2D} context
-   * @param {number} ratio
-   * @param {number} x
-   * @param {number} y
-   * @param {number} yaw
-   * @param {number} [factor]
-   * @param {number} [down]
-   */
-  enterPose(context, ratio, x, y, yaw, factor = 1, down = 0) {
+  /** Set a context to metres at a pose, x forward; enlarged, and shifted down [px]. */
+  enterPose(context: CanvasRenderingContext2D, ratio: number, x: number, y: number, yaw: number,
+    factor = 1, down = 0) {
     const cos = ratio * factor * Math.cos(yaw);
     const sin = ratio * factor * Math.sin(yaw);
     context.setTransform(this.a * cos + this.c * sin, this.b * cos + this.d * sin,
@@ -316,11 +235,7 @@ export class Camera {
     return this.height - this.covered;
   }
 
-  /**
-   * @param {Partial<Aim>} aim
-   * @param {boolean} animated
-   */
-  #send(aim, animated) {
+  #send(aim: Partial<Aim>, animated: boolean) {
     const before = { x: this.x, y: this.y, scale: this.scale, up: this.up, down: this.#down() };
     Object.assign(this.#aim, aim);
     this.#aim.scale = clamp(this.#aim.scale, MIN_SCALE, MAX_SCALE);
@@ -358,19 +273,10 @@ export class Camera {
   }
 }
 
-/**
- * @param {number} value
- * @param {number} low
- * @param {number} high
- */
-function clamp(value, low, high) {
+function clamp(value: number, low: number, high: number) {
   return Math.min(Math.max(value, low), high);
 }
 
-/**
- * @param {number} value
- * @param {number} negligible
- */
-function shrink(value, negligible) {
+function shrink(value: number, negligible: number) {
   return Math.abs(value) < negligible ? 0 : value;
 }

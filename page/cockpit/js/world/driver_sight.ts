@@ -4,17 +4,17 @@
 
 import { OBJECT_WIDTH, VEHICLE_WIDTH } from '../frames.js';
 
-/** @import { Shown, Store } from '../store.js' */
+import type { Shown, Store } from '../store.js';
 
-/** @typedef {{id: string, range: number}} Sight from a vehicle, limited by visibility [m] */
+export interface Sight { id: string; range: number } // from a vehicle, limited by visibility [m]
 
 /**
  * Return the seat from which this page's person looks.
  *
- * @param {Store} store its scene has the visibility
- * @returns {Sight|null} null without a seat, which sees all: directors, spectators
+ * @param store its scene has the visibility
+ * @returns null without a seat, which sees all: directors, spectators
  */
-export function driverSight({ scene }) {
+export function driverSight({ scene }: Store): Sight | null {
   const { driving, stage, view3d } = window.crgame;
   const id = driving?.seat ?? stage?.address.seat
     ?? (view3d?.on && view3d.viewpoint === 'driver' ? view3d.vehicle : null);
@@ -24,15 +24,16 @@ export function driverSight({ scene }) {
 /**
  * Remove the objects that are too far away to be visible.
  *
- * @param {Pick<Shown, 'vehicles'|'objects'>} shown x of invisible objects becomes NaN
- * @param {number} own index of the own vehicle; without one, nothing is done
- * @param {number} range [m]
+ * @param shown x of invisible objects becomes NaN
+ * @param own index of the own vehicle; without one, nothing is done
+ * @param range [m]
  */
-export function hideBeyond({ vehicles, objects }, own, range) {
+export function hideBeyond({ vehicles, objects }: Pick<Shown, 'vehicles' | 'objects'>, own: number,
+  range: number) {
   const row = own * VEHICLE_WIDTH;
   const [x, y] = [vehicles[row], vehicles[row + 1]];
-  for (const [rows, width] of /** @type {const} */ ([
-    [vehicles, VEHICLE_WIDTH], [objects, OBJECT_WIDTH]])) {
+  for (const [rows, width] of [
+    [vehicles, VEHICLE_WIDTH], [objects, OBJECT_WIDTH]] as const) {
     for (let i = 0; i < rows.length; i += width) {
       // False for NaN: without an own vehicle, no object is too far away.
       if (Math.hypot(rows[i] - x, rows[i + 1] - y) > range) {

@@ -7,32 +7,27 @@ const LINE_PX = 30;
 // A click moves less than this [px].
 const CLICK_PX = 4;
 
-/**
- * The actions of gestures, in CSS pixels and rad, counter-clockwise on the screen.
- *
- * @typedef {object} Actions
- * @property {(dx: number, dy: number) => void} pan
- * @property {(factor: number, x: number, y: number) => void} zoom
- * @property {(angle: number, x?: number, y?: number) => void} rotate
- * @property {(x: number, y: number) => void} pick a double click
- */
+/** The actions of gestures, in CSS pixels and rad, counter-clockwise on the screen. */
+export interface Actions {
+  pan: (dx: number, dy: number) => void;
+  zoom: (factor: number, x: number, y: number) => void;
+  rotate: (angle: number, x?: number, y?: number) => void;
+  pick: (x: number, y: number) => void; // a double click
+}
 
-/** @typedef {{x: number, y: number}} Place on the canvas [px] */
-/** @typedef {Place & {moved: number}} Hand */
+export interface Place { x: number; y: number } // on the canvas [px]
+export interface Hand extends Place { moved: number }
 
 /**
  * Make pointers move a camera.
  *
- * @param {HTMLCanvasElement} canvas receives the pointers
- * @param {Actions} actions
+ * @param canvas receives the pointers
  */
-export function attachGestures(canvas, actions) {
-  /** @type {Map<number, Hand>} */
-  const hands = new Map();
+export function attachGestures(canvas: HTMLCanvasElement, actions: Actions) {
+  const hands = new Map<number, Hand>();
   let turning = false;
 
-  /** @param {MouseEvent} event */
-  const place = (event) => {
+  const place = (event: MouseEvent) => {
     const box = canvas.getBoundingClientRect();
     return { x: event.clientX - box.left, y: event.clientY - box.top };
   };
@@ -68,8 +63,7 @@ export function attachGestures(canvas, actions) {
     hand.y = now.y;
   });
 
-  /** @param {PointerEvent} event */
-  const leave = (event) => {
+  const leave = (event: PointerEvent) => {
     hands.delete(event.pointerId);
     if (hands.size === 0) {
       canvas.classList.remove('dragging');
@@ -93,12 +87,10 @@ export function attachGestures(canvas, actions) {
 }
 
 /**
- * @param {Place} before of the moving pointer
- * @param {Place} other of the resting pointer
- * @param {Place} now
- * @param {Actions} actions
+ * @param before of the moving pointer
+ * @param other of the resting pointer
  */
-function pinch(before, other, now, actions) {
+function pinch(before: Place, other: Place, now: Place, actions: Actions) {
   const x = (now.x + other.x) / 2;
   const y = (now.y + other.y) / 2;
   actions.pan((now.x - before.x) / 2, (now.y - before.y) / 2);
@@ -110,15 +102,8 @@ function pinch(before, other, now, actions) {
   }
 }
 
-/**
- * Return the angle counter-clockwise on the screen, whose y points down.
- *
- * @param {number} x
- * @param {number} y
- * @param {Place} from
- * @param {Place} to
- */
-function angleAt(x, y, from, to) {
+/** Return the angle counter-clockwise on the screen, whose y points down. */
+function angleAt(x: number, y: number, from: Place, to: Place) {
   const angle = Math.atan2(from.y - y, from.x - x) - Math.atan2(to.y - y, to.x - x);
   return Math.atan2(Math.sin(angle), Math.cos(angle));
 }

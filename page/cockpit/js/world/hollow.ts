@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The drawing of unseen things: dashed outlines, and a ring around people. */
 
-/** @import { View } from './painter.js' */
-/** @import { Thing } from './vehicle_layer.js' */
+import type { View } from './painter.js';
+import type { Thing } from './vehicle_layer.js';
 
 const FILL_ALPHA = 0.1;
 const LINE_PX = 1.8;
@@ -15,16 +15,18 @@ const RING_DASH_PX = [5, 4];
 /**
  * Draw the outline of a thing.
  *
- * @param {CanvasRenderingContext2D} context of the world
- * @param {Pick<View, 'camera'|'palette'|'ratio'>} view camera, palette and ratio
- * @param {Thing} thing with its look and color
- * @param {number} x of its centre [m]
- * @param {number} y [m]
- * @param {number} yaw [rad]
- * @param {number} leastPx its least length on the screen [px]
- * @returns {number} factor by which it is enlarged
+ * @param context of the world
+ * @param view camera, palette and ratio
+ * @param thing with its look and color
+ * @param x of its centre [m]
+ * @param y [m]
+ * @param yaw [rad]
+ * @param leastPx its least length on the screen [px]
+ * @returns factor by which it is enlarged
  */
-export function drawOutline(context, { camera, palette, ratio }, thing, x, y, yaw, leastPx) {
+export function drawOutline(context: CanvasRenderingContext2D,
+  { camera, palette, ratio }: Pick<View, 'camera' | 'palette' | 'ratio'>, thing: Thing, x: number,
+  y: number, yaw: number, leastPx: number): number {
   const { look } = thing;
   const factor = Math.max(1, leastPx / (look.extent * camera.scale));
   const pixel = 1 / (camera.scale * factor);

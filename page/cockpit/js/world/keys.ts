@@ -4,7 +4,7 @@
 
 import { isTyping } from '../driving/focus.js';
 
-/** @import { WorldActions } from './toolbar.js' */
+import type { WorldActions } from './toolbar.js';
 
 const ZOOM_STEP = 1.25;
 const TURN_STEP = Math.PI / 12;
@@ -12,12 +12,10 @@ const TURN_STEP = Math.PI / 12;
 /**
  * Make keys move the camera.
  *
- * @param {WorldActions} actions
- * @returns {() => void} ends it
+ * @returns ends it
  */
-export function attachKeys(actions) {
-  /** @type {Record<string, (() => void)|undefined>} */
-  const bindings = {
+export function attachKeys(actions: WorldActions): () => void {
+  const bindings: Record<string, (() => void) | undefined> = {
     '+': () => actions.zoomBy(ZOOM_STEP),
     '=': () => actions.zoomBy(ZOOM_STEP),
     '-': () => actions.zoomBy(1 / ZOOM_STEP),
@@ -28,8 +26,7 @@ export function attachKeys(actions) {
     e: () => actions.turnBy(-TURN_STEP),
     l: () => actions.toggleLabels(),
   };
-  /** @param {KeyboardEvent} event */
-  const pressed = (event) => {
+  const pressed = (event: KeyboardEvent) => {
     if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) {
       return;
     }

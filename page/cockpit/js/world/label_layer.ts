@@ -4,29 +4,23 @@
 
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 
-/** @import { LiveView, View } from './painter.js' */
-/** @import { Thing, VehicleLayer } from './vehicle_layer.js' */
+import type { LiveView, View } from './painter.js';
+import type { Thing, VehicleLayer } from './vehicle_layer.js';
 
 // Objects' ids are not drawn where they would cover each other [px/m].
 const OBJECTS_FROM = 1.5;
 const FONT_REM = 0.85;
 // Most labels that make room for each other.
 const MOST_PLACED = 24;
-const NEXT = /** @type {const} */ ({ vehicles: 'all', all: 'none', none: 'vehicles' });
+const NEXT = { vehicles: 'all', all: 'none', none: 'vehicles' } as const;
 
 /** Ids of driven vehicles, and of objects on request. */
 export class LabelLayer {
-  /**
-   * The ids that are shown.
-   *
-   * @type {'none'|'vehicles'|'all'}
-   */
-  shown = 'vehicles';
-  /** @type {Map<string, number>} */
-  #widths = new Map();
+  /** The ids that are shown. */
+  shown: 'none' | 'vehicles' | 'all' = 'vehicles';
+  #widths = new Map<string, number>();
   #font = '';
-  /** @type {{x: number, y: number, width: number}[]} */
-  #places = [];
+  #places: { x: number; y: number; width: number }[] = [];
   #placed = 0;
 
   /** Switch to the next of the three settings. */
@@ -34,14 +28,8 @@ export class LabelLayer {
     this.shown = NEXT[this.shown];
   }
 
-  /**
-   * Draw the ids over everything.
-   *
-   * @param {CanvasRenderingContext2D} context
-   * @param {LiveView} view
-   * @param {VehicleLayer} layer
-   */
-  draw(context, view, layer) {
+  /** Draw the ids over everything. */
+  draw(context: CanvasRenderingContext2D, view: LiveView, layer: VehicleLayer) {
     if (this.shown === 'none') {
       return;
     }
@@ -74,15 +62,8 @@ export class LabelLayer {
     }
   }
 
-  /**
-   * Move a label down until it covers no other; return its y [px].
-   *
-   * @param {number} px
-   * @param {number} py
-   * @param {number} width
-   * @param {number} height
-   */
-  #free(px, py, width, height) {
+  /** Move a label down until it covers no other; return its y [px]. */
+  #free(px: number, py: number, width: number, height: number) {
     let y = py;
     for (let i = 0; i < this.#placed; i += 1) {
       const other = this.#places[i];
@@ -99,15 +80,8 @@ export class LabelLayer {
     return y;
   }
 
-  /**
-   * @param {CanvasRenderingContext2D} context
-   * @param {View} view
-   * @param {string} text
-   * @param {Thing} thing
-   * @param {number} x
-   * @param {number} y
-   */
-  #draw(context, { camera, palette }, text, thing, x, y) {
+  #draw(context: CanvasRenderingContext2D, { camera, palette }: View, text: string, thing: Thing,
+    x: number, y: number) {
     if (!camera.sees(x, y, thing.look.radius)) {
       return;
     }

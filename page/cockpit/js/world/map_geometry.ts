@@ -7,8 +7,8 @@ import { collectBoundaries } from './boundaries.js';
 import { strokesOf } from './marking_strokes.js';
 import { addDashes, addLine, addPolygon, lengthOf, poseAlong, shifted } from './polyline.js';
 
-/** @import { Box, Lanelet, Scene } from '../messages.js' */
-/** @import { Boundary } from './boundaries.js' */
+import type { Box, Lanelet, Scene } from '../messages.js';
+import type { Boundary } from './boundaries.js';
 
 const CELL_M = 120;
 const ARROW_EVERY_M = 32;
@@ -16,32 +16,35 @@ const SHORTEST_FOR_ARROW_M = 9;
 const ZEBRA_M = 0.5;
 
 /** Surfaces from the lowest to the highest, by their names in the palette. */
-export const SURFACES = /** @type {const} */ (['walk', 'parking', 'cycle', 'road', 'junction']);
+export const SURFACES = ['walk', 'parking', 'cycle', 'road', 'junction'] as const;
 
-const PATH_OF_STROKE = /** @type {const} */ (
-  { line: 'lines', broad: 'broad', curb: 'curbs', lowered: 'curbs', seam: 'seams' });
-/** @type {Record<string, Surface|undefined>} */
-const SURFACE_OF_TYPE = {
+const PATH_OF_STROKE = {
+  line: 'lines', broad: 'broad', curb: 'curbs', lowered: 'curbs', seam: 'seams',
+} as const;
+const SURFACE_OF_TYPE: Record<string, Surface | undefined> = {
   sidewalk: 'walk', crosswalk: 'junction', bicycleLane: 'cycle', parking: 'parking',
   shoulder: 'parking', border: 'parking', restricted: 'parking',
 };
 
-/**
- * @typedef {typeof SURFACES[number]} Surface
- * @typedef {Record<'casing'|'seams'|'lines'|'broad'|'curbs'|'arrows'|'zebras', Path2D>} Paths in
- *   metres around (x, y)
- * @typedef {{x: number, y: number, box: Box, surfaces: Map<Surface, Path2D>} & Paths} Chunk
- */
+export type Surface = typeof SURFACES[number];
+/** In metres around (x, y). */
+export type Paths = Record<'casing' | 'seams' | 'lines' | 'broad' | 'curbs' | 'arrows' | 'zebras',
+  Path2D>;
+
+export interface Chunk extends Paths {
+  x: number;
+  y: number;
+  box: Box;
+  surfaces: Map<Surface, Path2D>;
+}
 
 /**
  * Build the paths of a scene, each chunk relative to its own point, so that float32 suffices.
  *
- * @param {Pick<Scene, 'lanelets'>} scene the scene document
- * @returns {Chunk[]}
+ * @param scene the scene document
  */
-export function buildChunks(scene) {
-  /** @type {Map<string, Chunk>} */
-  const chunks = new Map();
+export function buildChunks(scene: Pick<Scene, 'lanelets'>): Chunk[] {
+  const chunks = new Map<string, Chunk>();
   const homes = scene.lanelets.map((lanelet) => {
     const outline = outlineOf(lanelet);
     const box = boxOf(outline);
@@ -60,21 +63,11 @@ export function buildChunks(scene) {
   return [...chunks.values()];
 }
 
-/**
- * @param {Box} a
- * @param {Box} b
- * @returns {Box}
- */
-function union(a, b) {
+function union(a: Box, b: Box): Box {
   return [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3])];
 }
 
-/**
- * @param {number} x
- * @param {number} y
- * @returns {Chunk}
- */
-function emptyChunk(x, y) {
+function emptyChunk(x: number, y: number): Chunk {
   return {
     x, y, box: [Infinity, Infinity, -Infinity, -Infinity], casing: new Path2D(),
     surfaces: new Map(), seams: new Path2D(), lines: new Path2D(), broad: new Path2D(),
@@ -82,23 +75,14 @@ function emptyChunk(x, y) {
   };
 }
 
-/**
- * Return the surface of a lanelet.
- *
- * @param {Pick<Lanelet, 'types'|'intersection'>} lanelet
- * @returns {Surface}
- */
-export function surfaceOf({ types, intersection }) {
+/** Return the surface of a lanelet. */
+export function surfaceOf(
+  { types, intersection }: Pick<Lanelet, 'types' | 'intersection'>): Surface {
   const special = types.find((type) => type in SURFACE_OF_TYPE);
   return SURFACE_OF_TYPE[special ?? ''] ?? (intersection ? 'junction' : 'road');
 }
 
-/**
- * @param {Chunk} chunk
- * @param {Lanelet} lanelet
- * @param {number[]} outline
- */
-function addSurface(chunk, lanelet, outline) {
+function addSurface(chunk: Chunk, lanelet: Lanelet, outline: number[]) {
   const special = lanelet.types.find((type) => type in SURFACE_OF_TYPE);
   const surface = surfaceOf(lanelet);
   const path = chunk.surfaces.get(surface) ?? new Path2D();
@@ -117,16 +101,14 @@ function addSurface(chunk, lanelet, outline) {
 /**
  * Return the stripes of a crossing, along the traffic and across the path of pedestrians.
  *
- * @param {Pick<Lanelet, 'left'|'right'>} lanelet
- * @returns {number[][]} flat polygons
+ * @returns flat polygons
  */
-export function zebraStripes(lanelet) {
+export function zebraStripes(lanelet: Pick<Lanelet, 'left' | 'right'>): number[][] {
   const length = Math.min(lengthOf(lanelet.left), lengthOf(lanelet.right));
   const stripes = [];
   for (let s = ZEBRA_M / 2; s + ZEBRA_M < length; s += 2 * ZEBRA_M) {
-    /** @type {[line: number[], at: number][]} */
-    const corners = [[lanelet.left, s], [lanelet.left, s + ZEBRA_M],
-      [lanelet.right, s + ZEBRA_M], [lanelet.right, s]];
+    const corners: [line: number[], at: number][] = [[lanelet.left, s],
+      [lanelet.left, s + ZEBRA_M], [lanelet.right, s + ZEBRA_M], [lanelet.right, s]];
     stripes.push(corners.flatMap(([line, at]) => {
       const { x, y } = poseAlong(line, at);
       return [x, y];
@@ -135,11 +117,7 @@ export function zebraStripes(lanelet) {
   return stripes;
 }
 
-/**
- * @param {Chunk} chunk
- * @param {number[]} center
- */
-function addArrows(chunk, center) {
+function addArrows(chunk: Chunk, center: number[]) {
   const length = lengthOf(center);
   if (length < SHORTEST_FOR_ARROW_M) {
     return;
@@ -150,13 +128,8 @@ function addArrows(chunk, center) {
   }
 }
 
-/**
- * Add a slender arrow on the lane, 3.6 m long.
- *
- * @param {Chunk} chunk
- * @param {{x: number, y: number, yaw: number}} pose
- */
-function addArrow(chunk, { x, y, yaw }) {
+/** Add a slender arrow on the lane, 3.6 m long. */
+function addArrow(chunk: Chunk, { x, y, yaw }: { x: number; y: number; yaw: number }) {
   const shape = [-1.8, 0.07, 0.5, 0.07, 0.5, 0.42, 1.8, 0, 0.5, -0.42, 0.5, -0.07, -1.8, -0.07];
   const cos = Math.cos(yaw);
   const sin = Math.sin(yaw);
@@ -167,12 +140,7 @@ function addArrow(chunk, { x, y, yaw }) {
   addPolygon(chunk.arrows, placed, chunk.x, chunk.y);
 }
 
-/**
- * @param {Chunk} chunk
- * @param {Boundary} boundary
- * @param {Lanelet} lanelet
- */
-function addBoundary(chunk, boundary, lanelet) {
+function addBoundary(chunk: Chunk, boundary: Boundary, lanelet: Lanelet) {
   for (const { kind, offset, dash } of strokesOf(boundary, lanelet)) {
     const path = chunk[PATH_OF_STROKE[kind]];
     const line = offset === 0 ? boundary.line : shifted(boundary.line, offset);

@@ -6,9 +6,9 @@ import { boxOf } from '../outline.js';
 import { buildChunks, SURFACES } from './map_geometry.js';
 import { addLine, addPolygon } from './polyline.js';
 
-/** @import { Box, Scene } from '../messages.js' */
-/** @import { Chunk } from './map_geometry.js' */
-/** @import { View } from './painter.js' */
+import type { Box, Scene } from '../messages.js';
+import type { Chunk } from './map_geometry.js';
+import type { View } from './painter.js';
 
 // Line widths [m], and the least that they are drawn with [CSS px].
 const WIDTH = {
@@ -24,28 +24,23 @@ const ROAD_PX = 1.5;
 const GRID_PX = 90;
 const GOAL_DASH = [1.2, 0.8];
 
-/** @typedef {{x: number, y: number, box: Box, path: Path2D}} Local a path around (x, y) */
+export interface Local { x: number; y: number; box: Box; path: Path2D } // a path around (x, y)
 
 /** The part of the world that does not change during a run. */
 export class MapLayer {
-  /** @type {Chunk[]} */
-  #chunks = [];
-  /** @type {Chunk[]} */
-  #visible = [];
-  /** @type {Local[]} */
-  #gaps = [];
-  /** @type {Local[]} */
-  #stops = [];
-  /** @type {Local[]} */
-  #goals = [];
+  #chunks: Chunk[] = [];
+  #visible: Chunk[] = [];
+  #gaps: Local[] = [];
+  #stops: Local[] = [];
+  #goals: Local[] = [];
 
   /** Whether the lanes' direction arrows are shown. */
   arrows = true;
   /** Whether the AVs' goals are shown. */
   goals = true;
 
-  /** @param {Scene} scene the scene document */
-  load(scene) {
+  /** @param scene the scene document */
+  load(scene: Scene) {
     this.#chunks = buildChunks(scene);
     this.#stops = scene.stop_lines.map(({ points }) => local(points, addLine));
     this.#gaps = (scene.gaps ?? []).map((gap) => local(gap, addPolygon));
@@ -53,13 +48,8 @@ export class MapLayer {
       polygons.map((polygon) => local(polygon, addPolygon)));
   }
 
-  /**
-   * Draw everything that lies under vehicles and plans.
-   *
-   * @param {CanvasRenderingContext2D} context
-   * @param {View} view
-   */
-  draw(context, view) {
+  /** Draw everything that lies under vehicles and plans. */
+  draw(context: CanvasRenderingContext2D, view: View) {
     this.#drawGround(context, view);
     this.#visible.length = 0;
     for (const chunk of this.#chunks) {
@@ -74,13 +64,8 @@ export class MapLayer {
     this.#drawMarks(context, view);
   }
 
-  /**
-   * Draw a faint grid, which shows motion where there is no road.
-   *
-   * @param {CanvasRenderingContext2D} context
-   * @param {View} view
-   */
-  #drawGround(context, { camera, palette, ratio }) {
+  /** Draw a faint grid, which shows motion where there is no road. */
+  #drawGround(context: CanvasRenderingContext2D, { camera, palette, ratio }: View) {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.fillStyle = palette.ground;
     context.fillRect(0, 0, camera.width, camera.height);
@@ -104,13 +89,8 @@ export class MapLayer {
     context.stroke();
   }
 
-  /**
-   * Draw edges first and all surfaces over them, so that the outer edge of the road remains.
-   *
-   * @param {CanvasRenderingContext2D} context
-   * @param {View} view
-   */
-  #drawSurfaces(context, { camera, palette, ratio }) {
+  /** Draw edges first and all surfaces over them, so that the outer edge of the road remains. */
+  #drawSurfaces(context: CanvasRenderingContext2D, { camera, palette, ratio }: View) {
     context.lineJoin = 'round';
     const kerbs = faded(camera.scale, KERBS);
     if (kerbs > 0) {
@@ -148,11 +128,7 @@ export class MapLayer {
     }
   }
 
-  /**
-   * @param {CanvasRenderingContext2D} context
-   * @param {View} view
-   */
-  #drawMarks(context, view) {
+  #drawMarks(context: CanvasRenderingContext2D, view: View) {
     const { camera, palette } = view;
     const marks = faded(camera.scale, MARKS);
     if (marks > 0) {
@@ -178,14 +154,8 @@ export class MapLayer {
     }
   }
 
-  /**
-   * @param {CanvasRenderingContext2D} context
-   * @param {View} view
-   * @param {'seams'|'curbs'|'lines'|'broad'} name
-   * @param {string} color
-   * @param {number} alpha
-   */
-  #strokeAll(context, { camera, ratio }, name, color, alpha) {
+  #strokeAll(context: CanvasRenderingContext2D, { camera, ratio }: View,
+    name: 'seams' | 'curbs' | 'lines' | 'broad', color: string, alpha: number) {
     context.globalAlpha = alpha;
     context.strokeStyle = color;
     context.lineWidth = Math.max(WIDTH[name], LEAST_PX / camera.scale);
@@ -195,14 +165,8 @@ export class MapLayer {
     }
   }
 
-  /**
-   * @param {CanvasRenderingContext2D} context
-   * @param {View} view
-   * @param {'zebras'|'arrows'} name
-   * @param {string} color
-   * @param {number} alpha
-   */
-  #fillAll(context, { camera, ratio }, name, color, alpha) {
+  #fillAll(context: CanvasRenderingContext2D, { camera, ratio }: View, name: 'zebras' | 'arrows',
+    color: string, alpha: number) {
     context.globalAlpha = alpha;
     context.fillStyle = color;
     for (const chunk of this.#visible) {
@@ -211,11 +175,7 @@ export class MapLayer {
     }
   }
 
-  /**
-   * @param {CanvasRenderingContext2D} context
-   * @param {View} view
-   */
-  #drawGoals(context, { camera, palette, ratio }) {
+  #drawGoals(context: CanvasRenderingContext2D, { camera, palette, ratio }: View) {
     context.fillStyle = palette.av;
     context.strokeStyle = palette.av;
     for (const goal of this.#goals) {
@@ -234,17 +194,10 @@ export class MapLayer {
   }
 }
 
-/** @type {number[]} */
-const NO_DASH = [];
+const NO_DASH: number[] = [];
 
-/**
- * Return a path relative to the middle of its points.
- *
- * @param {number[]} points
- * @param {typeof addPolygon} add
- * @returns {Local}
- */
-function local(points, add) {
+/** Return a path relative to the middle of its points. */
+function local(points: number[], add: typeof addPolygon): Local {
   const box = boxOf(points);
   const x = (box[0] + box[2]) / 2;
   const y = (box[1] + box[3]) / 2;
@@ -253,21 +206,17 @@ function local(points, add) {
   return { x, y, box, path };
 }
 
-/**
- * @param {number} scale
- * @param {number[]} range
- */
-function faded(scale, [from, to]) {
+function faded(scale: number, [from, to]: number[]) {
   return Math.min(Math.max((scale - from) / (to - from), 0), 1);
 }
 
 /**
  * Round a length up to 1, 2 or 5 times a power of ten.
  *
- * @param {number} length any positive length
- * @returns {number} the rounded one
+ * @param length any positive length
+ * @returns the rounded one
  */
-export function roundStep(length) {
+export function roundStep(length: number): number {
   const power = 10 ** Math.floor(Math.log10(length));
   const lead = length / power;
   return power * (lead <= 1 ? 1 : lead <= 2 ? 2 : lead <= 5 ? 5 : 10);

@@ -7,24 +7,21 @@
  * distinguishes motorways, country roads and roads in towns.
  */
 
-/** @import { Lanelet } from '../messages.js' */
-/** @import { Boundary } from './boundaries.js' */
+import type { Lanelet } from '../messages.js';
+import type { Boundary } from './boundaries.js';
 
-/** @typedef {'motorway'|'country'|'town'} RoadClass */
-/** @typedef {[painted: number, gap: number]} Dash [m] */
+export type RoadClass = 'motorway' | 'country' | 'town';
+export type Dash = [painted: number, gap: number]; // [m]
 
-/**
- * One line along a boundary.
- *
- * @typedef {object} Stroke
- * @property {'line'|'broad'|'curb'|'lowered'|'seam'} kind
- * @property {number} offset of its middle to the left of the boundary [m]
- * @property {number} width [m]
- * @property {Dash|null} dash null for an unbroken one
- */
+/** One line along a boundary. */
+export interface Stroke {
+  kind: 'line' | 'broad' | 'curb' | 'lowered' | 'seam';
+  offset: number; // of its middle to the left of the boundary [m]
+  width: number; // [m]
+  dash: Dash | null; // null for an unbroken one
+}
 
-/** @type {Record<RoadClass, {line: number, broad: number, dash: Dash, blocks: Dash}>} */
-const LAYOUTS = {
+const LAYOUTS: Record<RoadClass, { line: number; broad: number; dash: Dash; blocks: Dash }> = {
   motorway: { line: 0.15, broad: 0.3, dash: [6, 12], blocks: [6, 6] },
   country: { line: 0.12, broad: 0.25, dash: [4, 8], blocks: [3, 3] },
   town: { line: 0.12, broad: 0.25, dash: [3, 6], blocks: [3, 3] },
@@ -38,13 +35,9 @@ const MOTORWAY_TYPES = ['interstate', 'highway', 'mainCarriageWay', 'accessRamp'
 const MOTORWAY_MPS = 95 / 3.6;
 const COUNTRY_MPS = 65 / 3.6;
 
-/**
- * Return the class of a lanelet's road, from its types and its speed limit.
- *
- * @param {Pick<Lanelet, 'types'|'speed_limit'>} lanelet
- * @returns {RoadClass}
- */
-export function roadClass({ types, speed_limit }) {
+/** Return the class of a lanelet's road, from its types and its speed limit. */
+export function roadClass(
+  { types, speed_limit }: Pick<Lanelet, 'types' | 'speed_limit'>): RoadClass {
   if (types.some((type) => MOTORWAY_TYPES.includes(type))) {
     return 'motorway';
   }
@@ -58,14 +51,12 @@ export function roadClass({ types, speed_limit }) {
 /**
  * Return the strokes or kerb along a boundary.
  *
- * @param {Pick<Boundary, 'marking'|'inner'>} boundary
- * @param {Lanelet} lanelet whose boundary it is
- * @returns {Stroke[]}
+ * @param lanelet whose boundary it is
  */
-export function strokesOf({ marking, inner }, lanelet) {
+export function strokesOf({ marking, inner }: Pick<Boundary, 'marking' | 'inner'>,
+  lanelet: Lanelet): Stroke[] {
   const layout = LAYOUTS[roadClass(lanelet)];
-  /** @type {(style: string, offset: number) => Stroke} */
-  const line = (style, offset) => ({
+  const line = (style: string, offset: number): Stroke => ({
     kind: 'line', offset, width: layout.line, dash: style === 'solid' ? null : layout.dash });
   const [left, right] = marking.split('_');
   switch (marking) {

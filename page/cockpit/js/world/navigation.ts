@@ -2,35 +2,28 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The navigation of the camera: following a vehicle, gestures and keys. */
 
-/** @import { Box, Pose, Scene } from '../messages.js' */
-/** @import { Camera } from './camera.js' */
-/** @import { Actions } from './gestures.js' */
+import type { Box, Pose, Scene } from '../messages.js';
+import type { Camera } from './camera.js';
+import type { Actions } from './gestures.js';
 
 /** The navigation of one world's camera. */
 export class Navigation {
-  /**
-   * Id of the followed vehicle or object, null while the camera is free.
-   *
-   * @type {string|null}
-   */
-  followed = null;
+  /** Id of the followed vehicle or object, null while the camera is free. */
+  followed: string | null = null;
   #camera;
   #headingUp = true;
   #begun = false;
   #zoomed = true;
-  /** @type {string[]} */
-  #ids = [];
-  /** @type {Box|null} */
-  #bounds = null;
-  /** @type {string|null} */
-  #sceneId = null;
+  #ids: string[] = [];
+  #bounds: Box | null = null;
+  #sceneId: string | null = null;
   #changed;
 
   /**
-   * @param {Camera} camera that is moved
-   * @param {() => void} changed called after each requested move
+   * @param camera that is moved
+   * @param changed called after each requested move
    */
-  constructor(camera, changed) {
+  constructor(camera: Camera, changed: () => void) {
     this.#camera = camera;
     this.#changed = changed;
   }
@@ -43,10 +36,10 @@ export class Navigation {
   /**
    * Load a scene; the view stays as it is if the map is the same as before.
    *
-   * @param {Scene} scene the scene document
-   * @param {boolean} follow begin with the first vehicle instead of the whole map
+   * @param scene the scene document
+   * @param follow begin with the first vehicle instead of the whole map
    */
-  load(scene, follow) {
+  load(scene: Scene, follow: boolean) {
     this.#ids = scene.vehicles.map(({ id }) => id);
     this.#bounds = scene.bounds;
     if (scene.id !== this.#sceneId) {
@@ -60,13 +53,8 @@ export class Navigation {
     this.#changed();
   }
 
-  /**
-   * Follow a vehicle, see World.follow; if it is followed already, the scale stays.
-   *
-   * @param {string|null} id
-   * @param {boolean} [headingUp]
-   */
-  follow(id, headingUp = this.#headingUp) {
+  /** Follow a vehicle, see World.follow; if it is followed already, the scale stays. */
+  follow(id: string | null, headingUp = this.#headingUp) {
     this.#zoomed = id !== this.followed;
     this.followed = id;
     this.#headingUp = headingUp;
@@ -87,22 +75,14 @@ export class Navigation {
     this.#zoomed = true;
   }
 
-  /**
-   * Show a pose at close range, without following.
-   *
-   * @param {{x: number, y: number}} pose
-   */
-  lookAt({ x, y }) {
+  /** Show a pose at close range, without following. */
+  lookAt({ x, y }: { x: number; y: number }) {
     this.followed = null;
     this.#camera.lookAt(x, y);
     this.#changed();
   }
 
-  /**
-   * Show the whole map, north up.
-   *
-   * @param {boolean} [animated]
-   */
+  /** Show the whole map, north up. */
   fit(animated = true) {
     if (this.#bounds !== null) {
       this.followed = null;
@@ -121,32 +101,20 @@ export class Navigation {
     }
   }
 
-  /**
-   * Zoom about the followed vehicle or the middle, gliding.
-   *
-   * @param {number} factor
-   */
-  zoomBy(factor) {
+  /** Zoom about the followed vehicle or the middle, gliding. */
+  zoomBy(factor: number) {
     this.#camera.zoom(factor, undefined, undefined, true);
     this.#changed();
   }
 
-  /**
-   * Turn about the followed vehicle or the middle, gliding [rad].
-   *
-   * @param {number} angle
-   */
-  turnBy(angle) {
+  /** Turn about the followed vehicle or the middle, gliding [rad]. */
+  turnBy(angle: number) {
     this.#camera.rotate(angle, undefined, undefined, true);
     this.#changed();
   }
 
-  /**
-   * Return the actions of gestures, for attachGestures.
-   *
-   * @returns {Omit<Actions, 'pick'>}
-   */
-  get hands() {
+  /** Return the actions of gestures, for attachGestures. */
+  get hands(): Omit<Actions, 'pick'> {
     const camera = this.#camera;
     return {
       pan: (dx, dy) => {
@@ -175,10 +143,10 @@ export class Navigation {
   /**
    * Keep up with the followed vehicle.
    *
-   * @param {Pose|null} pose {x, y, yaw, speed} as shown, null while absent
-   * @param {boolean} animated move gradually to it at first
+   * @param pose {x, y, yaw, speed} as shown, null while absent
+   * @param animated move gradually to it at first
    */
-  steer(pose, animated) {
+  steer(pose: Pose | null, animated: boolean) {
     if (pose === null) {
       return;
     }

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** North arrow and scale bar in the upper right corner of the canvas. */
 
-/** @import { Camera } from './camera.js' */
-/** @import { View } from './painter.js' */
-/** @import { Colors } from './palette.js' */
+import type { Camera } from './camera.js';
+import type { View } from './painter.js';
+import type { Colors } from './palette.js';
 
 const LONGEST_BAR_REM = 6.5;
 // On a narrower canvas, such as the small map, they would cover the content.
@@ -15,10 +15,11 @@ const texts = lengths.map((length) => (length < 1000 ? `${length} m` : `${length
 /**
  * Draw both if there is room.
  *
- * @param {CanvasRenderingContext2D} context of the world
- * @param {Pick<View, 'camera'|'palette'|'ratio'>} view camera, palette and ratio
+ * @param context of the world
+ * @param view camera, palette and ratio
  */
-export function drawOverlay(context, { camera, palette, ratio }) {
+export function drawOverlay(context: CanvasRenderingContext2D,
+  { camera, palette, ratio }: Pick<View, 'camera' | 'palette' | 'ratio'>) {
   const rem = palette.rem_px;
   if (camera.width < NARROW_REM * rem) {
     return;
@@ -39,15 +40,8 @@ export function drawOverlay(context, { camera, palette, ratio }) {
   drawNorth(context, camera, palette, ratio, camera.width - 2.2 * rem, 2.3 * rem);
 }
 
-/**
- * @param {CanvasRenderingContext2D} context
- * @param {Colors} palette
- * @param {number} right
- * @param {number} y
- * @param {number} length
- * @param {string} text
- */
-function drawBar(context, palette, right, y, length, text) {
+function drawBar(context: CanvasRenderingContext2D, palette: Colors, right: number, y: number,
+  length: number, text: string) {
   const rem = palette.rem_px;
   context.strokeStyle = palette.overlay;
   context.lineWidth = Math.max(rem / 9, 1);
@@ -64,15 +58,8 @@ function drawBar(context, palette, right, y, length, text) {
   context.fillText(text, right, y - 0.7 * rem);
 }
 
-/**
- * @param {CanvasRenderingContext2D} context
- * @param {Camera} camera
- * @param {Colors} palette
- * @param {number} ratio
- * @param {number} x
- * @param {number} y
- */
-function drawNorth(context, camera, palette, ratio, x, y) {
+function drawNorth(context: CanvasRenderingContext2D, camera: Camera, palette: Colors,
+  ratio: number, x: number, y: number) {
   const rem = palette.rem_px;
   // On the canvas, north is the direction of the matrix's second column.
   const east = camera.a / camera.scale;

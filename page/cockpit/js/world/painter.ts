@@ -10,31 +10,28 @@ import { PredictionLayer } from './prediction_layer.js';
 import { SignalLayer } from './signal_layer.js';
 import { VehicleLayer } from './vehicle_layer.js';
 
-/** @import { Scene } from '../messages.js' */
-/** @import { Shown, Store } from '../store.js' */
-/** @import { Camera } from './camera.js' */
-/** @import { Colors } from './palette.js' */
+import type { Scene } from '../messages.js';
+import type { Shown, Store } from '../store.js';
+import type { Camera } from './camera.js';
+import type { Colors } from './palette.js';
 
-/**
- * The input of layers.
- *
- * @typedef {object} View
- * @property {Camera} camera enterMap and enterPose set a context up for metres
- * @property {Colors} palette
- * @property {number} ratio of device pixels to CSS pixels
- * @property {Store} store
- * @property {Scene|null} scene
- * @property {Shown|null} shown
- * @property {number} now_ms
- * @property {boolean} insight whether plans, perception and goals of AVs may be drawn
- */
+/** The input of layers. */
+export interface View {
+  camera: Camera; // enterMap and enterPose set a context up for metres
+  palette: Colors;
+  ratio: number; // of device pixels to CSS pixels
+  store: Store;
+  scene: Scene | null;
+  shown: Shown | null;
+  now_ms: number;
+  insight: boolean; // whether plans, perception and goals of AVs may be drawn
+}
 
-/**
- * @typedef {View & {scene: Scene, shown: Shown}} LiveView once there is something to show
- * @typedef {(context: CanvasRenderingContext2D, view: LiveView) => void} DrawLayer
- * @typedef {'below'|'above'} Place below or above the vehicles
- * @typedef {Map<string, {draw: DrawLayer, on: boolean}>} Layers by name
- */
+/** Once there is something to show. */
+export interface LiveView extends View { scene: Scene; shown: Shown }
+export type DrawLayer = (context: CanvasRenderingContext2D, view: LiveView) => void;
+export type Place = 'below' | 'above'; // below or above the vehicles
+export type Layers = Map<string, { draw: DrawLayer; on: boolean }>; // by name
 
 /** All layers of one world. */
 export class Painter {
@@ -44,24 +41,17 @@ export class Painter {
   plans = new PlanLayer();
   predictions = new PredictionLayer();
   labels = new LabelLayer();
-  /** @type {Record<Place, Layers>} */
-  #extra = { below: new Map(), above: new Map() };
+  #extra: Record<Place, Layers> = { below: new Map(), above: new Map() };
 
-  /** @param {Scene} scene the scene document */
-  load(scene) {
+  /** @param scene the scene document */
+  load(scene: Scene) {
     for (const layer of [this.map, this.signals, this.vehicles]) {
       layer.load(scene);
     }
   }
 
-  /**
-   * Add an external layer, which replaces one of the same name; see World.addLayer.
-   *
-   * @param {string} name
-   * @param {DrawLayer} draw
-   * @param {Place} where
-   */
-  add(name, draw, where) {
+  /** Add an external layer, which replaces one of the same name; see World.addLayer. */
+  add(name: string, draw: DrawLayer, where: Place) {
     this.#extra.below.delete(name);
     this.#extra.above.delete(name);
     this.#extra[where].set(name, { draw, on: true });
@@ -70,11 +60,11 @@ export class Painter {
   /**
    * Show or hide a layer.
    *
-   * @param {string} name as for World.setLayer
-   * @param {boolean} on whether it is shown
+   * @param name as for World.setLayer
+   * @param on whether it is shown
    * @throws {RangeError} when there is no such layer
    */
-  set(name, on) {
+  set(name: string, on: boolean) {
     switch (name) {
       case 'plans': this.plans.on = on; break;
       case 'predictions': this.predictions.on = on; break;
@@ -95,14 +85,14 @@ export class Painter {
   /**
    * Paint one frame.
    *
-   * @param {CanvasRenderingContext2D} context of the canvas
-   * @param {View} view camera, palette, ratio, store, scene, shown, now_ms
+   * @param context of the canvas
+   * @param view camera, palette, ratio, store, scene, shown, now_ms
    */
-  paint(context, view) {
+  paint(context: CanvasRenderingContext2D, view: View) {
     context.globalAlpha = 1;
     this.map.draw(context, view);
     if (view.scene !== null) {
-      const live = view.shown === null ? null : /** @type {LiveView} */ (view);
+      const live = view.shown === null ? null : view as LiveView;
       this.signals.drawBars(context, view);
       if (live !== null) {
         this.#paintMoving(context, live);
@@ -115,11 +105,7 @@ export class Painter {
     drawOverlay(context, view);
   }
 
-  /**
-   * @param {CanvasRenderingContext2D} context
-   * @param {LiveView} view
-   */
-  #paintMoving(context, view) {
+  #paintMoving(context: CanvasRenderingContext2D, view: LiveView) {
     paintExtra(this.#extra.below, context, view);
     if (view.insight) {
       this.plans.draw(context, view, this.vehicles.vehicles);
@@ -130,12 +116,7 @@ export class Painter {
   }
 }
 
-/**
- * @param {Layers} layers
- * @param {CanvasRenderingContext2D} context
- * @param {LiveView} view
- */
-function paintExtra(layers, context, view) {
+function paintExtra(layers: Layers, context: CanvasRenderingContext2D, view: LiveView) {
   for (const { draw, on } of layers.values()) {
     if (on) {
       context.save();

@@ -2,21 +2,21 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The colours of the theme in force, read from the style sheets' custom properties. */
 
-const NAMES = /** @type {const} */ ([
+const NAMES = [
   'human', 'av', 'recorded', 'vulnerable', 'static', 'traffic', 'scripted', 'alarm', 'accent',
   'map-ground', 'map-grid', 'map-road', 'map-junction', 'map-walk', 'map-cycle', 'map-parking',
   'map-kerb', 'map-mark', 'map-seam', 'map-arrow', 'map-stop', 'map-outline', 'map-glass',
   'map-lamp', 'map-brake', 'map-indicator', 'map-blue', 'map-shadow', 'map-label',
   'map-label-ground', 'map-overlay', 'map-ray', 'map-estimate', 'map-occupied',
-]);
+] as const;
 
 /**
  * Resolve a custom property to a colour for canvas and plots.
  *
- * @param {string} name without the leading dashes
- * @returns {string} a CSS colour without variables
+ * @param name without the leading dashes
+ * @returns a CSS colour without variables
  */
-export function themeColor(name) {
+export function themeColor(name: string): string {
   const probe = document.createElement('span');
   // Else all colours would be equal if the system forces its own colours.
   probe.style.forcedColorAdjust = 'none';
@@ -30,10 +30,10 @@ export function themeColor(name) {
 /**
  * Call a function at each change of the system's theme or of data-theme on <html>.
  *
- * @param {() => void} changed called after the new colours are in force
- * @returns {() => void} ends it
+ * @param changed called after the new colours are in force
+ * @returns ends it
  */
-export function onThemeChange(changed) {
+export function onThemeChange(changed: () => void): () => void {
   const observer = new MutationObserver(changed);
   observer.observe(document.documentElement, { attributeFilter: ['data-theme', 'class'] });
   const query = window.matchMedia('(prefers-color-scheme: dark)');
@@ -44,34 +44,25 @@ export function onThemeChange(changed) {
   };
 }
 
-/**
- * `map-label-ground` -> `labelGround`
- *
- * @template {string} Name
- * @typedef {Name extends `map-${infer Rest}` ? Camel<Rest>
- *   : Name extends `${infer Word}-${infer More}` ? `${Word}${Capitalize<Camel<More>>}`
- *   : Name} Camel
- */
+/** `map-label-ground` -> `labelGround` */
+export type Camel<Name extends string> = Name extends `map-${infer Rest}` ? Camel<Rest>
+  : Name extends `${infer Word}-${infer More}` ? `${Word}${Capitalize<Camel<More>>}` : Name;
 
-/**
- * @typedef {Camel<typeof NAMES[number]>} ColorName
- * @typedef {Palette & Record<ColorName, string>} Colors
- */
+export type ColorName = Camel<typeof NAMES[number]>;
+export type Colors = Palette & Record<ColorName, string>;
 
 /** Colours by name, 'map-' left out: palette.human, palette.road, palette.labelGround, … */
 export class Palette {
+  rem_px;
+
   constructor() {
     this.rem_px = 16;
     this.read();
   }
 
-  /**
-   * Return a palette with the current colours.
-   *
-   * @returns {Colors}
-   */
-  static ofTheme() {
-    return /** @type {Colors} */ (new Palette());
+  /** Return a palette with the current colours. */
+  static ofTheme(): Colors {
+    return new Palette() as Colors;
   }
 
   /** Read all colours, and the root's font size. */

@@ -4,10 +4,10 @@
 
 import { PLAN_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 
-/** @import { PlanFrame } from '../frames.js' */
-/** @import { FiredEvent, Scene } from '../messages.js' */
-/** @import { LiveView } from './painter.js' */
-/** @import { DrawnVehicle } from './vehicle_layer.js' */
+import type { PlanFrame } from '../frames.js';
+import type { FiredEvent, Scene } from '../messages.js';
+import type { LiveView } from './painter.js';
+import type { DrawnVehicle } from './vehicle_layer.js';
 
 // Dots are at multiples of this simulation time, so they stay in place if a new plan equals the
 // one before [s].
@@ -19,8 +19,7 @@ const FADED = 0.2;
 
 /** Plans of all AVs that are not hidden. */
 export class PlanLayer {
-  /** @type {Set<string>} */
-  #hidden = new Set();
+  #hidden = new Set<string>();
 
   /** Whether plans are shown at all. */
   on = true;
@@ -28,10 +27,10 @@ export class PlanLayer {
   /**
    * Update which AVs' plans are hidden, from the fired events.
    *
-   * @param {Scene|null} scene with the definitions of the events
-   * @param {FiredEvent[]} fired in order
+   * @param scene with the definitions of the events
+   * @param fired in order
    */
-  applyEvents(scene, fired) {
+  applyEvents(scene: Scene | null, fired: FiredEvent[]) {
     this.#hidden.clear();
     for (const { name } of fired) {
       const event = scene?.events.find((entry) => entry.name === name);
@@ -46,21 +45,15 @@ export class PlanLayer {
   }
 
   /**
-   * @param {string} id of an AV
-   * @returns {boolean} whether its plan is shown
+   * @param id of an AV
+   * @returns whether its plan is shown
    */
-  shows(id) {
+  shows(id: string): boolean {
     return this.on && !this.#hidden.has(id);
   }
 
-  /**
-   * Draw the future part of each plan.
-   *
-   * @param {CanvasRenderingContext2D} context
-   * @param {LiveView} view
-   * @param {DrawnVehicle[]} vehicles
-   */
-  draw(context, view, vehicles) {
+  /** Draw the future part of each plan. */
+  draw(context: CanvasRenderingContext2D, view: LiveView, vehicles: DrawnVehicle[]) {
     if (!this.on) {
       return;
     }
@@ -73,13 +66,8 @@ export class PlanLayer {
     }
   }
 
-  /**
-   * @param {CanvasRenderingContext2D} context
-   * @param {LiveView} view
-   * @param {PlanFrame} plan
-   * @param {DrawnVehicle} vehicle
-   */
-  #drawPlan(context, view, plan, vehicle) {
+  #drawPlan(context: CanvasRenderingContext2D, view: LiveView, plan: PlanFrame,
+    vehicle: DrawnVehicle) {
     const { shown, palette, camera, ratio } = view;
     const { points } = plan;
     const first = firstAfter(plan, shown.t);
@@ -109,13 +97,8 @@ export class PlanLayer {
   }
 }
 
-/**
- * Return the index of the first value of the first point after a time [s].
- *
- * @param {PlanFrame} plan
- * @param {number} now_t
- */
-function firstAfter({ t, points }, now_t) {
+/** Return the index of the first value of the first point after a time [s]. */
+function firstAfter({ t, points }: PlanFrame, now_t: number) {
   let i = 0;
   while (i < points.length && t + points[i + 4] <= now_t) {
     i += PLAN_WIDTH;
@@ -123,18 +106,9 @@ function firstAfter({ t, points }, now_t) {
   return i;
 }
 
-/**
- * Add the band from the vehicle's current rear axle along the plan to its future front.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {Float64Array} points
- * @param {number} first
- * @param {number} x
- * @param {number} y
- * @param {number} yaw
- * @param {DrawnVehicle} vehicle
- */
-function addBand(context, points, first, x, y, yaw, { shape, rear_to_center: ahead }) {
+/** Add the band from the vehicle's current rear axle along the plan to its future front. */
+function addBand(context: CanvasRenderingContext2D, points: Float64Array, first: number, x: number,
+  y: number, yaw: number, { shape, rear_to_center: ahead }: DrawnVehicle) {
   const half = shape.width / 2;
   const last = points.length - PLAN_WIDTH;
   const nose = ahead + shape.length / 2;
@@ -158,15 +132,8 @@ function addBand(context, points, first, x, y, yaw, { shape, rear_to_center: ahe
   context.closePath();
 }
 
-/**
- * @param {CanvasRenderingContext2D} context
- * @param {LiveView} view
- * @param {PlanFrame} plan
- * @param {number} first
- * @param {number} x
- * @param {number} y
- */
-function drawDots(context, { camera, shown }, { t, points }, first, x, y) {
+function drawDots(context: CanvasRenderingContext2D, { camera, shown }: LiveView,
+  { t, points }: PlanFrame, first: number, x: number, y: number) {
   const radius = Math.min(Math.max(DOT_M, DOT_PX[0] / camera.scale), DOT_PX[1] / camera.scale);
   const horizon = t + points[points.length - 1] - shown.t;
   for (let i = Math.max(first, PLAN_WIDTH); i < points.length; i += PLAN_WIDTH) {

@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Polylines as flat lists x0, y0, x1, y1, … [m], added to paths. */
 
-/** @typedef {Pick<Path2D, 'moveTo'|'lineTo'>} Lines receiver of lines */
+export type Lines = Pick<Path2D, 'moveTo' | 'lineTo'>; // receiver of lines
 
 /**
- * @param {number[]} line flat polyline
- * @returns {number} its length [m]
+ * @param line flat polyline
+ * @returns its length [m]
  */
-export function lengthOf(line) {
+export function lengthOf(line: number[]): number {
   let length = 0;
   for (let i = 2; i < line.length; i += 2) {
     length += Math.hypot(line[i] - line[i - 2], line[i + 1] - line[i - 1]);
@@ -19,11 +19,12 @@ export function lengthOf(line) {
 /**
  * Find the pose at a distance along a polyline.
  *
- * @param {number[]} line flat polyline
- * @param {number} distance from its start [m]
- * @returns {{x: number, y: number, yaw: number}} on the line; beyond its end, the end
+ * @param line flat polyline
+ * @param distance from its start [m]
+ * @returns on the line; beyond its end, the end
  */
-export function poseAlong(line, distance) {
+export function poseAlong(line: number[],
+  distance: number): { x: number; y: number; yaw: number } {
   let rest = distance;
   for (let i = 2; i < line.length; i += 2) {
     const dx = line[i] - line[i - 2];
@@ -41,11 +42,11 @@ export function poseAlong(line, distance) {
 /**
  * Shift a polyline sideways.
  *
- * @param {number[]} line flat polyline
- * @param {number} offset to the left [m]
- * @returns {number[]} flat polyline with as many points
+ * @param line flat polyline
+ * @param offset to the left [m]
+ * @returns flat polyline with as many points
  */
-export function shifted(line, offset) {
+export function shifted(line: number[], offset: number): number[] {
   const last = line.length - 2;
   const result = new Array(line.length);
   for (let i = 0; i <= last; i += 2) {
@@ -63,12 +64,12 @@ export function shifted(line, offset) {
 /**
  * Add a whole polyline to a path.
  *
- * @param {Lines} path receives it
- * @param {number[]} line flat polyline
- * @param {number} ox subtracted from x [m]
- * @param {number} oy subtracted from y [m]
+ * @param path receives it
+ * @param line flat polyline
+ * @param ox subtracted from x [m]
+ * @param oy subtracted from y [m]
  */
-export function addLine(path, line, ox, oy) {
+export function addLine(path: Lines, line: number[], ox: number, oy: number) {
   path.moveTo(line[0] - ox, line[1] - oy);
   for (let i = 2; i < line.length; i += 2) {
     path.lineTo(line[i] - ox, line[i + 1] - oy);
@@ -78,14 +79,15 @@ export function addLine(path, line, ox, oy) {
 /**
  * Add the dashes of a polyline to a path, each by itself: cheaper than dashing at every frame.
  *
- * @param {Lines} path receives them
- * @param {number[]} line flat polyline
- * @param {number} ox subtracted from x [m]
- * @param {number} oy subtracted from y [m]
- * @param {number} dash length of a dash [m]
- * @param {number} gap between two dashes [m]
+ * @param path receives them
+ * @param line flat polyline
+ * @param ox subtracted from x [m]
+ * @param oy subtracted from y [m]
+ * @param dash length of a dash [m]
+ * @param gap between two dashes [m]
  */
-export function addDashes(path, line, ox, oy, dash, gap) {
+export function addDashes(path: Lines, line: number[], ox: number, oy: number, dash: number,
+  gap: number) {
   let drawing = true;
   let left = dash;
   path.moveTo(line[0] - ox, line[1] - oy);
@@ -116,12 +118,12 @@ export function addDashes(path, line, ox, oy, dash, gap) {
 /**
  * Add a closed outline to a path.
  *
- * @param {Path2D} path receives it
- * @param {number[]} outline flat polygon
- * @param {number} ox subtracted from x [m]
- * @param {number} oy subtracted from y [m]
+ * @param path receives it
+ * @param outline flat polygon
+ * @param ox subtracted from x [m]
+ * @param oy subtracted from y [m]
  */
-export function addPolygon(path, outline, ox, oy) {
+export function addPolygon(path: Path2D, outline: number[], ox: number, oy: number) {
   addLine(path, outline, ox, oy);
   path.closePath();
 }

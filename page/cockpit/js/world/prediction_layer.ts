@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Predictions in the planners' requests: lines that end in an outline. */
 
-/** @import { LiveView, View } from './painter.js' */
-/** @import { Thing, VehicleLayer } from './vehicle_layer.js' */
+import type { LiveView, View } from './painter.js';
+import type { Thing, VehicleLayer } from './vehicle_layer.js';
 
 const STRIDE = 3;
 const LINE_ALPHA = 0.65;
@@ -14,14 +14,8 @@ export class PredictionLayer {
   /** Whether predictions are shown. */
   on = false;
 
-  /**
-   * Draw the future part of each prediction.
-   *
-   * @param {CanvasRenderingContext2D} context
-   * @param {LiveView} view
-   * @param {VehicleLayer} layer
-   */
-  draw(context, view, layer) {
+  /** Draw the future part of each prediction. */
+  draw(context: CanvasRenderingContext2D, view: LiveView, layer: VehicleLayer) {
     if (!this.on) {
       return;
     }
@@ -42,14 +36,8 @@ export class PredictionLayer {
   }
 }
 
-/**
- * @param {CanvasRenderingContext2D} context
- * @param {View} view
- * @param {Thing} thing
- * @param {Float64Array} points
- * @param {number} first
- */
-function drawEntry(context, { camera, ratio, palette }, thing, points, first) {
+function drawEntry(context: CanvasRenderingContext2D, { camera, ratio, palette }: View,
+  thing: Thing, points: Float64Array, first: number) {
   const last = points.length - STRIDE;
   const x = points[first];
   const y = points[first + 1];

@@ -2,16 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 /** A copy of the drawn state: the store refills its own arrays at the next call. */
 
-/** @import { Shown } from '../store.js' */
+import type { Shown } from '../store.js';
 
 /**
  * Copy the current state into the kept one.
  *
- * @param {Shown|null} kept of the frame before, refilled; null makes a new one
- * @param {Shown|null} shown of Store.displayed
- * @returns {Shown|null} {t, n, k, epoch, vehicles, objects}
+ * @param kept of the frame before, refilled; null makes a new one
+ * @param shown of Store.displayed
+ * @returns {t, n, k, epoch, vehicles, objects}
  */
-export function keepShown(kept, shown) {
+export function keepShown(kept: Shown | null, shown: Shown | null): Shown | null {
   if (shown === null) {
     return null;
   }
@@ -23,11 +23,7 @@ export function keepShown(kept, shown) {
   });
 }
 
-/**
- * @param {Float64Array} target
- * @param {Float64Array} values
- */
-function copied(target, values) {
+function copied(target: Float64Array, values: Float64Array) {
   const result = target.length === values.length ? target : new Float64Array(values.length);
   result.set(values);
   return result;

@@ -2,17 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Traffic lights: the lamps in their housing, and the state across the end of each lane. */
 
-/** @import { Light, Scene } from '../messages.js' */
-/** @import { View } from './painter.js' */
+import type { Light, Scene } from '../messages.js';
+import type { View } from './painter.js';
 
-/** @type {Record<string, string[]|undefined>} */
-const LIT = { red: ['red'], redYellow: ['red', 'yellow'], yellow: ['yellow'], green: ['green'] };
+const LIT: Record<string, string[] | undefined> = {
+  red: ['red'], redYellow: ['red', 'yellow'], yellow: ['yellow'], green: ['green'],
+};
 // Lamps differ in place too, for colour-blind users.
 const LAMPS = [['red', '#ff4b3e'], ['yellow', '#ffc933'], ['green', '#19c37d']];
 const OFF = '#3a3f47';
 const HOUSING = '#14171b';
-/** @type {Record<string, string|undefined>} */
-const BAR_COLOR = { red: '#ff4b3e', redYellow: '#ff8f2e', yellow: '#ffc933', green: '#19c37d' };
+const BAR_COLOR: Record<string, string | undefined> = {
+  red: '#ff4b3e', redYellow: '#ff8f2e', yellow: '#ffc933', green: '#19c37d',
+};
 const BAR_M = 0.35;
 const LONGEST_BAR_M = 15;
 const LAMP_M = 0.32;
@@ -21,11 +23,10 @@ const HIDDEN_BELOW = 1.2;
 
 /** The lights of the scene and their states. */
 export class SignalLayer {
-  /** @type {(Light & {ends: number[][]})[]} */
-  #lights = [];
+  #lights: (Light & { ends: number[][] })[] = [];
 
-  /** @param {Scene} scene the scene document */
-  load(scene) {
+  /** @param scene the scene document */
+  load(scene: Scene) {
     const lanelets = new Map(scene.lanelets.map((lanelet) => [lanelet.id, lanelet]));
     this.#lights = scene.lights.map((light) => ({
       ...light, ends: light.lanelets.map((id) => lanelets.get(id))
@@ -34,13 +35,8 @@ export class SignalLayer {
     }));
   }
 
-  /**
-   * Draw the bars on the road, under the vehicles.
-   *
-   * @param {CanvasRenderingContext2D} context
-   * @param {View} view
-   */
-  drawBars(context, { camera, ratio, store }) {
+  /** Draw the bars on the road, under the vehicles. */
+  drawBars(context: CanvasRenderingContext2D, { camera, ratio, store }: View) {
     context.lineWidth = Math.max(BAR_M, 2 / camera.scale);
     for (const light of this.#lights) {
       const color = BAR_COLOR[store.signals.states[light.id]];
@@ -60,13 +56,8 @@ export class SignalLayer {
     }
   }
 
-  /**
-   * Draw the housings, over everything on the road.
-   *
-   * @param {CanvasRenderingContext2D} context
-   * @param {View} view
-   */
-  drawLamps(context, { camera, palette, ratio, store }) {
+  /** Draw the housings, over everything on the road. */
+  drawLamps(context: CanvasRenderingContext2D, { camera, palette, ratio, store }: View) {
     if (camera.scale < HIDDEN_BELOW) {
       return;
     }

@@ -16,34 +16,35 @@ const ICONS = {
   labels: 'M3 6h11l6 6l-6 6H3zM7 10v4M10 10v4',
 };
 
-/**
- * The actions of keys and buttons.
- *
- * @typedef {object} WorldActions
- * @property {(factor: number) => void} zoomBy
- * @property {(angle: number) => void} turnBy [rad]
- * @property {() => void} fit
- * @property {() => void} followNext
- * @property {() => void} recenter
- * @property {() => void} toggleHeading
- * @property {() => void} togglePlans
- * @property {() => void} togglePredictions
- * @property {() => void} toggleLabels
- */
+/** The actions of keys and buttons. */
+export interface WorldActions {
+  zoomBy: (factor: number) => void;
+  turnBy: (angle: number) => void; // [rad]
+  fit: () => void;
+  followNext: () => void;
+  recenter: () => void;
+  toggleHeading: () => void;
+  togglePlans: () => void;
+  togglePredictions: () => void;
+  toggleLabels: () => void;
+}
 
-/**
- * @typedef {{followed: string|null, headingUp: boolean, plans: boolean, predictions: boolean,
- *   labels: boolean}} ToolbarState
- */
+export interface ToolbarState {
+  followed: string | null;
+  headingUp: boolean;
+  plans: boolean;
+  predictions: boolean;
+  labels: boolean;
+}
 
 /**
  * Put the buttons on the world.
  *
- * @param {HTMLElement} root the element that holds the canvas
- * @param {WorldActions} actions
- * @returns {{update: (state: ToolbarState) => void}} update shows the state
+ * @param root the element that holds the canvas
+ * @returns update shows the state
  */
-export function createToolbar(root, actions) {
+export function createToolbar(root: HTMLElement,
+  actions: WorldActions): { update: (state: ToolbarState) => void } {
   const bar = element('div', { class: 'world-toolbar', role: 'toolbar', 'aria-label': 'View' });
   const group = () => {
     const node = element('div', { class: 'world-group' });
@@ -85,13 +86,13 @@ export function createToolbar(root, actions) {
 /**
  * Make a button of the toolbar.
  *
- * @param {HTMLElement} root group that receives it
- * @param {string} strokes SVG path of its picture in a square of 24
- * @param {string} title what it does
- * @param {() => void} action called by a click
- * @returns {HTMLButtonElement}
+ * @param root group that receives it
+ * @param strokes SVG path of its picture in a square of 24
+ * @param title what it does
+ * @param action called by a click
  */
-export function toolButton(root, strokes, title, action) {
+export function toolButton(root: HTMLElement, strokes: string, title: string,
+  action: () => void): HTMLButtonElement {
   const button = element('button', {
     type: 'button', title, 'aria-label': title, on: {
       click: () => {
@@ -111,9 +112,8 @@ export function toolButton(root, strokes, title, action) {
 /**
  * Show whether the switch of a button is on.
  *
- * @param {HTMLElement} button
- * @param {boolean} pressed whether it is on
+ * @param pressed whether it is on
  */
-export function press(button, pressed) {
+export function press(button: HTMLElement, pressed: boolean) {
   button.setAttribute('aria-pressed', String(pressed));
 }

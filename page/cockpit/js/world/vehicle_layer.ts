@@ -8,47 +8,39 @@ import { BrakeLights } from './brake_lights.js';
 import { drawOutline } from './hollow.js';
 import { vehicleLook, TYRE } from './vehicle_shape.js';
 
-/** @import { Pose, Scene, SceneObject, SceneVehicle } from '../messages.js' */
-/** @import { Shown } from '../store.js' */
-/** @import { LiveView, View } from './painter.js' */
-/** @import { ColorName } from './palette.js' */
-/** @import { Look } from './vehicle_shape.js' */
+import type { Pose, Scene, SceneObject, SceneVehicle } from '../messages.js';
+import type { Shown } from '../store.js';
+import type { LiveView, View } from './painter.js';
+import type { ColorName } from './palette.js';
+import type { Look } from './vehicle_shape.js';
 
 // Least length of things on the screen [px]: driven vehicles, people
 // on foot or bicycles, and all others.
-/** @type {Record<string, number>} */
-const LEAST_PX = { driven: 15, vulnerable: 14, other: 6 };
+const LEAST_PX: Record<string, number> = { driven: 15, vulnerable: 14, other: 6 };
 // Below this length on the screen only the body of a thing is drawn [px].
 const DETAIL_PX = 13;
 const TYRE_INSET_M = 0.2;
 const BLUE_LIGHTS = new Path2D('M-.2-.65h.4v.5h-.4zM-.2 .15h.4v.5h-.4z');
 const SHADOW_PX = 2;
 
-/**
- * @typedef {{look: Look, color: ColorName}} Appearance
- * @typedef {SceneVehicle & Appearance} DrawnVehicle
- * @typedef {SceneObject & Appearance} DrawnObject
- * @typedef {Appearance & {id: string, rear_to_center?: number}} Thing a vehicle or an object
- * @typedef {(view: LiveView) => Uint8Array|null} ChooseHollow
- */
+export interface Appearance { look: Look; color: ColorName }
+export type DrawnVehicle = SceneVehicle & Appearance;
+export type DrawnObject = SceneObject & Appearance;
+/** A vehicle or an object. */
+export interface Thing extends Appearance { id: string; rear_to_center?: number }
+export type ChooseHollow = (view: LiveView) => Uint8Array | null;
 
 /** Everything that has a pose. */
 export class VehicleLayer {
   // In the order of STATE and OBJECTS.
-  /** @type {DrawnVehicle[]} */
-  vehicles = [];
-  /** @type {DrawnObject[]} */
-  objects = [];
-  /**
-   * Chooses in each frame which things are drawn hollow; see World.drawHollow.
-   *
-   * @type {ChooseHollow}
-   */
-  hollow = () => null;
+  vehicles: DrawnVehicle[] = [];
+  objects: DrawnObject[] = [];
+  /** Chooses in each frame which things are drawn hollow; see World.drawHollow. */
+  hollow: ChooseHollow = () => null;
   brakeLights = new BrakeLights();
 
-  /** @param {Scene} scene the scene document */
-  load(scene) {
+  /** @param scene the scene document */
+  load(scene: Scene) {
     this.vehicles = scene.vehicles.map((vehicle) => ({
       ...vehicle, look: vehicleLook(vehicle.type, vehicle.shape, true),
       color: vehicle.role === 'human' ? 'human' : 'av',
@@ -63,11 +55,11 @@ export class VehicleLayer {
   /**
    * Return the pose of the centre of a driven vehicle or an object in the frame shown last.
    *
-   * @param {string} id of it
-   * @param {Shown} shown of Store.displayed
-   * @returns {Pose|null} null while it is absent
+   * @param id of it
+   * @param shown of Store.displayed
+   * @returns null while it is absent
    */
-  poseOf(id, shown) {
+  poseOf(id: string, shown: Shown): Pose | null {
     const index = this.vehicles.findIndex((vehicle) => vehicle.id === id);
     if (index >= 0) {
       return centerOf(this.vehicles[index], shown.vehicles, index);
@@ -83,12 +75,9 @@ export class VehicleLayer {
   /**
    * Return the vehicle or object at a point of the canvas.
    *
-   * @param {number} px
-   * @param {number} py
-   * @param {LiveView} view
-   * @returns {string|null} the id of the nearest within a finger's reach
+   * @returns the id of the nearest within a finger's reach
    */
-  pick(px, py, { camera, shown }) {
+  pick(px: number, py: number, { camera, shown }: LiveView): string | null {
     let best = null;
     let reach = 24;
     for (const { id, look } of [...this.vehicles, ...this.objects]) {
@@ -104,13 +93,8 @@ export class VehicleLayer {
     return best;
   }
 
-  /**
-   * Draw objects, then the driven vehicles over them.
-   *
-   * @param {CanvasRenderingContext2D} context
-   * @param {LiveView} view
-   */
-  draw(context, view) {
+  /** Draw objects, then the driven vehicles over them. */
+  draw(context: CanvasRenderingContext2D, view: LiveView) {
     const { camera, shown, ratio, store } = view;
     const hollow = this.hollow(view);
     for (let i = 0; i < this.objects.length; i += 1) {
@@ -139,13 +123,7 @@ export class VehicleLayer {
     }
   }
 
-  /**
-   * @param {CanvasRenderingContext2D} context
-   * @param {LiveView} view
-   * @param {number} index
-   * @param {boolean} hollow
-   */
-  #drawVehicle(context, view, index, hollow) {
+  #drawVehicle(context: CanvasRenderingContext2D, view: LiveView, index: number, hollow: boolean) {
     const { camera, shown, ratio, palette, store } = view;
     const vehicle = this.vehicles[index];
     const row = index * VEHICLE_WIDTH;
@@ -177,17 +155,8 @@ export class VehicleLayer {
   }
 }
 
-/**
- * @param {CanvasRenderingContext2D} context
- * @param {View} view
- * @param {Thing} thing
- * @param {number} x
- * @param {number} y
- * @param {number} yaw
- * @param {boolean} braking
- * @param {number} leastPx
- */
-function drawLook(context, { camera, palette, ratio }, thing, x, y, yaw, braking, leastPx) {
+function drawLook(context: CanvasRenderingContext2D, { camera, palette, ratio }: View,
+  thing: Thing, x: number, y: number, yaw: number, braking: boolean, leastPx: number) {
   const { look } = thing;
   const factor = Math.max(1, leastPx / (look.extent * camera.scale));
   const detailed = look.extent * camera.scale > DETAIL_PX;
@@ -221,18 +190,9 @@ function drawLook(context, { camera, palette, ratio }, thing, x, y, yaw, braking
   return factor;
 }
 
-/**
- * Draw the front wheels, turned by the steering angle.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {View} view
- * @param {DrawnVehicle} vehicle
- * @param {number} x
- * @param {number} y
- * @param {number} yaw
- * @param {number} steering
- */
-function drawTyres(context, { camera, ratio, palette }, vehicle, x, y, yaw, steering) {
+/** Draw the front wheels, turned by the steering angle. */
+function drawTyres(context: CanvasRenderingContext2D, { camera, ratio, palette }: View,
+  vehicle: DrawnVehicle, x: number, y: number, yaw: number, steering: number) {
   const aside = vehicle.shape.width / 2 - TYRE_INSET_M;
   context.fillStyle = palette.outline;
   context.strokeStyle = palette.kerb;
@@ -250,18 +210,16 @@ function drawTyres(context, { camera, ratio, palette }, vehicle, x, y, yaw, stee
 /**
  * Draw indicators at the corners, blue lights on the roof, and the horn as arcs ahead.
  *
- * @param {CanvasRenderingContext2D} context in the vehicle's coordinates
- * @param {LiveView} view
- * @param {Thing} vehicle
- * @param {number} lights
+ * @param context in the vehicle's coordinates
  */
-function drawLights(context, { shown, palette }, { look }, lights) {
+function drawLights(context: CanvasRenderingContext2D, { shown, palette }: LiveView,
+  { look }: Thing, lights: number) {
   const { left, right, horn, blue } = shining(lights, shown.t);
   context.fillStyle = palette.indicator;
   context.strokeStyle = palette.outline;
   context.lineWidth = 0.08;
-  for (const [on, path] of /** @type {const} */ ([
-    [left, look.indicators?.left], [right, look.indicators?.right]])) {
+  for (const [on, path] of [
+    [left, look.indicators?.left], [right, look.indicators?.right]] as const) {
     if (on && path !== undefined) {
       context.fill(path);
       context.stroke(path);
@@ -283,13 +241,8 @@ function drawLights(context, { shown, palette }, { look }, lights) {
   }
 }
 
-/**
- * @param {SceneVehicle} vehicle
- * @param {Float64Array} rows
- * @param {number} index
- * @returns {Pose|null}
- */
-function centerOf({ rear_to_center: ahead }, rows, index) {
+function centerOf({ rear_to_center: ahead }: SceneVehicle, rows: Float64Array,
+  index: number): Pose | null {
   const row = index * VEHICLE_WIDTH;
   const yaw = rows[row + VEHICLE.yaw];
   return Number.isFinite(rows[row])
@@ -299,11 +252,7 @@ function centerOf({ rear_to_center: ahead }, rows, index) {
     } : null;
 }
 
-/**
- * @param {SceneObject} object
- * @returns {ColorName}
- */
-function colorOf({ type, role }) {
+function colorOf({ type, role }: SceneObject): ColorName {
   if (type === 'pedestrian' || type === 'bicycle') {
     return 'vulnerable';
   }

@@ -2,21 +2,20 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Shapes of things from above: paths in metres around the centre, x forward. */
 
-/** @import { Shape } from '../messages.js' */
+import type { Shape } from '../messages.js';
 
-/**
- * @typedef {object} Look
- * @property {Path2D} body filled in the colour of its role
- * @property {Path2D|null} glass windows: the windscreen shows where the front is
- * @property {Path2D|null} roof over the glass, in the body's colour
- * @property {Path2D|null} lamps at the front
- * @property {Path2D|null} brakes lamps at the back
- * @property {{left: Path2D, right: Path2D}|null} indicators at the corners
- * @property {number} extent the longer side [m]
- * @property {number} radius of the circle around it [m]
- */
+export interface Look {
+  body: Path2D; // filled in the colour of its role
+  glass: Path2D | null; // windows: the windscreen shows where the front is
+  roof: Path2D | null; // over the glass, in the body's colour
+  lamps: Path2D | null; // at the front
+  brakes: Path2D | null; // lamps at the back
+  indicators: { left: Path2D; right: Path2D } | null; // at the corners
+  extent: number; // the longer side [m]
+  radius: number; // of the circle around it [m]
+}
 
-/** @typedef {Omit<Look, 'extent'|'radius'|'indicators'>} Parts */
+export type Parts = Omit<Look, 'extent' | 'radius' | 'indicators'>;
 
 const LONG_VEHICLES = new Set(['truck', 'bus', 'train']);
 const TWO_WHEELS = new Set(['bicycle', 'motorcycle']);
@@ -25,12 +24,11 @@ const CARS = new Set(['car', 'parkedVehicle', 'taxi', 'priorityVehicle', 'unknow
 /**
  * Build the look of a vehicle or obstacle.
  *
- * @param {string} type CommonRoad obstacle type
- * @param {Shape} shape
- * @param {boolean} moves whether it has a front
- * @returns {Look} paths around the shape's centre
+ * @param type CommonRoad obstacle type
+ * @param moves whether it has a front
+ * @returns paths around the shape's centre
  */
-export function vehicleLook(type, shape, moves) {
+export function vehicleLook(type: string, shape: Shape, moves: boolean): Look {
   const { kind, length, width } = shape;
   const rest = {
     extent: Math.max(length, width), radius: 0.5 * Math.hypot(length, width),
@@ -56,12 +54,7 @@ export function vehicleLook(type, shape, moves) {
 /** A tyre seen from above, around its own centre. */
 export const TYRE = boxes([[-0.33, -0.12, 0.66, 0.24]], 0.08);
 
-/**
- * @param {number} length
- * @param {number} width
- * @returns {Parts}
- */
-function car(length, width) {
+function car(length: number, width: number): Parts {
   const l = length / 2;
   const w = width / 2;
   const body = new Path2D();
@@ -90,39 +83,24 @@ function car(length, width) {
   return { body, glass, roof, ...lamps(l, w) };
 }
 
-/**
- * @param {number} l
- * @param {number} w
- */
-function lamps(l, w) {
+function lamps(l: number, w: number) {
   return {
     lamps: boxes([[l - 0.34, 0.5 * w, 0.2, 0.34 * w], [l - 0.34, -0.84 * w, 0.2, 0.34 * w]], 0.06),
     brakes: boxes([[-l, 0.46 * w, 0.26, 0.48 * w], [-l, -0.94 * w, 0.26, 0.48 * w]], 0.06),
   };
 }
 
-/**
- * @param {number} length
- * @param {number} width
- */
-function corners(length, width) {
+function corners(length: number, width: number) {
   // Half beyond the body, so that they are visible from afar and on any colour.
   const l = length / 2;
   const deep = 0.3 * width;
   const along = 0.16 * length;
   const at = [l - along, -l];
-  /** @type {(y: number) => Path2D} */
-  const side = (y) => boxes(at.map((x) => [x, y, along, deep]), 0.08);
+  const side = (y: number): Path2D => boxes(at.map((x) => [x, y, along, deep]), 0.08);
   return { left: side(width / 2 - 0.4 * deep), right: side(-width / 2 - 0.6 * deep) };
 }
 
-/**
- * @param {number} length
- * @param {number} width
- * @param {boolean} isTruck
- * @returns {Parts}
- */
-function longVehicle(length, width, isTruck) {
+function longVehicle(length: number, width: number, isTruck: boolean): Parts {
   const l = length / 2;
   const w = width / 2;
   const body = boxes([[-l, -w, length, width]], 0.25);
@@ -134,12 +112,7 @@ function longVehicle(length, width, isTruck) {
   return { body, glass, roof: null, ...lamps(l, w) };
 }
 
-/**
- * @param {number} length
- * @param {number} width
- * @returns {Parts}
- */
-function twoWheeler(length, width) {
+function twoWheeler(length: number, width: number): Parts {
   const l = length / 2;
   const w = Math.max(width / 2, 0.2);
   const body = boxes([[-l, -0.16, length, 0.32]], 0.16);
@@ -155,12 +128,7 @@ function twoWheeler(length, width) {
   };
 }
 
-/**
- * @param {number} length
- * @param {number} width
- * @returns {Parts}
- */
-function pedestrian(length, width) {
+function pedestrian(length: number, width: number): Parts {
   const body = new Path2D();
   body.ellipse(0, 0, length / 2, width / 2, 0, 0, 2 * Math.PI);
   body.moveTo(0.5 * length, -0.24 * width);
@@ -171,12 +139,7 @@ function pedestrian(length, width) {
   return { body, glass: head, roof: null, lamps: null, brakes: null };
 }
 
-/**
- * @param {Shape} shape
- * @param {boolean} moves
- * @returns {Parts}
- */
-function block({ kind, length, width, vertices }, moves) {
+function block({ kind, length, width, vertices }: Shape, moves: boolean): Parts {
   const body = new Path2D();
   if (kind === 'circle') {
     body.arc(0, 0, length / 2, 0, 2 * Math.PI);
@@ -200,11 +163,7 @@ function block({ kind, length, width, vertices }, moves) {
   return { body, glass: nose, roof: null, lamps: null, brakes: null };
 }
 
-/**
- * @param {number[][]} list
- * @param {number} radius
- */
-function boxes(list, radius) {
+function boxes(list: number[][], radius: number) {
   const path = new Path2D();
   for (const [x, y, length, width] of list) {
     path.roundRect(x, y, length, width, radius);

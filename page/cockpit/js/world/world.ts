@@ -12,41 +12,35 @@ import { onThemeChange, Palette } from './palette.js';
 import { keepShown } from './shown.js';
 import { createToolbar } from './toolbar.js';
 
-/** @import { Connection } from '../connection.js' */
-/** @import { Pose, Scene } from '../messages.js' */
-/** @import { Shown, Store } from '../store.js' */
-/** @import { Sight } from './driver_sight.js' */
-/** @import { DrawLayer, LiveView, Place, View } from './painter.js' */
-/** @import { WorldActions } from './toolbar.js' */
-/** @import { ChooseHollow, DrawnVehicle } from './vehicle_layer.js' */
+import type { Connection } from '../connection.js';
+import type { Pose, Scene } from '../messages.js';
+import type { Shown, Store } from '../store.js';
+import type { Sight } from './driver_sight.js';
+import type { DrawLayer, LiveView, Place, View } from './painter.js';
+import type { WorldActions } from './toolbar.js';
+import type { ChooseHollow, DrawnVehicle } from './vehicle_layer.js';
 
 const FRAMES_KEPT = 600;
 // A canvas whose height changes by more than this factor counts as a new map [-].
 const OTHER_SIZE = 1.6;
-const REDRAWN_ON = /** @type {const} */ (['state', 'objects', 'plan', 'prediction', 'perception',
-  'signals', 'status', 'seats', 'events', 'epoch', 'hello']);
+const REDRAWN_ON = ['state', 'objects', 'plan', 'prediction', 'perception',
+  'signals', 'status', 'seats', 'events', 'epoch', 'hello'] as const;
 
-/**
- * @typedef {object} Options
- * @property {Connection|null} [connection] receives the wanted layers
- * @property {boolean} [keys] whether keys are active
- * @property {boolean} [toolbar] whether there is a toolbar
- * @property {boolean} [follow] begin with the first vehicle instead of the whole map
- * @property {HTMLElement|null} [covered] an element that lies over the lower edge
- * @property {() => Sight|null} [sight] returns the seat of the user; without one, all is
- *   visible
- */
+export interface Options {
+  connection?: Connection | null; // receives the wanted layers
+  keys?: boolean; // whether keys are active
+  toolbar?: boolean; // whether there is a toolbar
+  follow?: boolean; // begin with the first vehicle instead of the whole map
+  covered?: HTMLElement | null; // an element that lies over the lower edge
+  sight?: () => Sight | null; // returns the seat of the user; without one, all is visible
+}
 
 /** One canvas that shows what a store holds. */
 export class World {
   /** Script time of the last frames [ms], a ring buffer: frame i is at i % its length. */
   stats = { frames: 0, frame_ms: new Float32Array(FRAMES_KEPT) };
-  /**
-   * The state exactly as drawn last, without invisible objects; null before.
-   *
-   * @type {Shown|null}
-   */
-  shown = null;
+  /** The state exactly as drawn last, without invisible objects; null before. */
+  shown: Shown | null = null;
   camera = new Camera();
 
   #canvas;
@@ -56,28 +50,23 @@ export class World {
   #palette = Palette.ofTheme();
   #painter = new Painter();
   #navigation = new Navigation(this.camera, () => this.#changed());
-  /** @type {ReturnType<typeof createToolbar>|null} */
-  #toolbar = null;
+  #toolbar: ReturnType<typeof createToolbar> | null = null;
   #follow;
   #sight;
   #dirty = true;
   // While something else is shown in its place, nothing is drawn.
   #away = false;
-  /** @type {View} */
-  #view;
-  /** @type {(() => void)[]} */
-  #ends = [];
+  #view: View;
+  #ends: (() => void)[] = [];
   #frame = 0;
 
   /**
-   * @param {HTMLCanvasElement} canvas its parent gets the toolbar
-   * @param {Store} store what is shown
-   * @param {Options} options
+   * @param canvas its parent gets the toolbar
+   * @param store what is shown
    */
-  constructor(canvas, store, options) {
+  constructor(canvas: HTMLCanvasElement, store: Store, options: Options) {
     this.#canvas = canvas;
-    this.#context = /** @type {CanvasRenderingContext2D} */ (
-      canvas.getContext('2d', { alpha: false }));
+    this.#context = canvas.getContext('2d', { alpha: false }) as CanvasRenderingContext2D;
     this.#store = store;
     this.#connection = options.connection ?? null;
     this.#follow = options.follow ?? true;
@@ -117,27 +106,23 @@ export class World {
   /**
    * Keep the camera on a vehicle or object.
    *
-   * @param {string|null} id null releases the camera
-   * @param {boolean} [headingUp] turn the map so that it drives upwards; as before by default
+   * @param id null releases the camera
+   * @param headingUp turn the map so that it drives upwards; as before by default
    */
-  follow(id, headingUp) {
+  follow(id: string | null, headingUp?: boolean) {
     this.#navigation.follow(id, headingUp);
   }
 
   /**
-   * @param {number} index of a driven vehicle
-   * @returns {DrawnVehicle|undefined} undefined for none
+   * @param index of a driven vehicle
+   * @returns undefined for none
    */
-  vehicle(index) {
+  vehicle(index: number): DrawnVehicle | undefined {
     return this.#painter.vehicles.vehicles[index];
   }
 
-  /**
-   * Show a vehicle or object in the middle, without following it.
-   *
-   * @param {string|null} id
-   */
-  centerOn(id) {
+  /** Show a vehicle or object in the middle, without following it. */
+  centerOn(id: string | null) {
     const pose = this.#poseOf(id);
     if (pose !== null) {
       this.#navigation.lookAt(pose);
@@ -152,12 +137,11 @@ export class World {
   /**
    * Show or hide a layer.
    *
-   * @param {string} name plans, predictions, goals, arrows, labels or object_labels, or one that
-   *   was added
-   * @param {boolean} on whether it is shown
+   * @param name plans, predictions, goals, arrows, labels or object_labels, or one that was added
+   * @param on whether it is shown
    * @throws {RangeError} when there is no such layer
    */
-  setLayer(name, on) {
+  setLayer(name: string, on: boolean) {
     this.#painter.set(name, on);
     if (name === 'predictions') {
       this.#sendLayers();
@@ -168,11 +152,10 @@ export class World {
   /**
    * Add an external layer.
    *
-   * @param {string} name for setLayer
-   * @param {DrawLayer} draw called in each frame
-   * @param {Place} [where]
+   * @param name for setLayer
+   * @param draw called in each frame
    */
-  addLayer(name, draw, where = 'below') {
+  addLayer(name: string, draw: DrawLayer, where: Place = 'below') {
     this.#painter.add(name, draw, where);
     this.redraw();
   }
@@ -180,10 +163,10 @@ export class World {
   /**
    * Set a function that chooses which things are drawn as outlines.
    *
-   * @param {ChooseHollow} choose called in each frame with the input of layers; returns 1 for each
-   *   vehicle, then object, that is hollow, null for none
+   * @param choose called in each frame with the input of layers; returns 1 for each vehicle, then
+   *   object, that is hollow, null for none
    */
-  drawHollow(choose) {
+  drawHollow(choose: ChooseHollow) {
     this.#painter.vehicles.hollow = choose;
     this.redraw();
   }
@@ -199,12 +182,10 @@ export class World {
     this.#ends.forEach((end) => end());
   }
 
-  /** @param {Options} options */
-  #attachHands({ keys = true, toolbar = true }) {
+  #attachHands({ keys = true, toolbar = true }: Options) {
     const navigation = this.#navigation;
     const { plans, predictions, labels } = this.#painter;
-    /** @type {WorldActions} */
-    const actions = {
+    const actions: WorldActions = {
       zoomBy: (factor) => navigation.zoomBy(factor),
       turnBy: (angle) => navigation.turnBy(angle),
       fit: () => navigation.fit(),
@@ -222,7 +203,7 @@ export class World {
       ...navigation.hands,
       pick: (x, y) => {
         const id = this.shown === null ? null
-          : this.#painter.vehicles.pick(x, y, /** @type {LiveView} */ (this.#view));
+          : this.#painter.vehicles.pick(x, y, this.#view as LiveView);
         if (id !== null) {
           navigation.follow(id);
         }
@@ -237,8 +218,7 @@ export class World {
     this.#changed();
   }
 
-  /** @param {HTMLElement|null} covered */
-  #attachSizes(covered) {
+  #attachSizes(covered: HTMLElement | null) {
     this.#ends.push(onThemeChange(() => {
       this.#palette.read();
       this.redraw();
@@ -265,8 +245,7 @@ export class World {
       ...REDRAWN_ON.map((name) => store.on(name, () => this.redraw())));
   }
 
-  /** @param {HTMLElement|null} covered */
-  #resize(covered) {
+  #resize(covered: HTMLElement | null) {
     const { clientWidth: width, clientHeight: height } = this.#canvas;
     this.#away = width === 0 || height === 0;
     if (this.#away) {
@@ -294,8 +273,7 @@ export class World {
     this.#draw(performance.now());
   }
 
-  /** @param {Scene} scene */
-  #load(scene) {
+  #load(scene: Scene) {
     this.#painter.load(scene);
     this.#view.scene = scene;
     this.#painter.plans.applyEvents(scene, this.#store.fired);
@@ -315,17 +293,12 @@ export class World {
     this.#connection?.send({ type: 'layers', predictions: this.#painter.predictions.on });
   }
 
-  /**
-   * @param {string|null} id
-   * @returns {Pose|null}
-   */
-  #poseOf(id) {
+  #poseOf(id: string | null): Pose | null {
     return id === null || this.shown === null ? null
       : this.#painter.vehicles.poseOf(id, this.shown);
   }
 
-  /** @param {number} now_ms */
-  #animate(now_ms) {
+  #animate(now_ms: number) {
     this.#frame = requestAnimationFrame((next_ms) => this.#animate(next_ms));
     this.#draw(now_ms);
   }
@@ -337,8 +310,7 @@ export class World {
     }
   }
 
-  /** @param {number} now_ms */
-  #draw(now_ms) {
+  #draw(now_ms: number) {
     if (this.#away) {
       return;
     }
@@ -361,12 +333,8 @@ export class World {
   }
 }
 
-/**
- * @param {HTMLElement} canvas
- * @param {HTMLElement|null} covered
- * @returns {number} how much of the canvas's lower edge an element covers [CSS px]
- */
-function coverOf(canvas, covered) {
+/** @returns how much of the canvas's lower edge an element covers [CSS px] */
+function coverOf(canvas: HTMLElement, covered: HTMLElement | null): number {
   if (covered === null || covered.offsetHeight === 0) {
     return 0;
   }
@@ -376,11 +344,11 @@ function coverOf(canvas, covered) {
 /**
  * Show a store's world on a canvas.
  *
- * @param {HTMLCanvasElement} canvas fills its parent
- * @param {Store} store what is shown
- * @param {Options} [options]
- * @returns {World} draws from now on
+ * @param canvas fills its parent
+ * @param store what is shown
+ * @returns draws from now on
  */
-export function createWorld(canvas, store, options = {}) {
+export function createWorld(canvas: HTMLCanvasElement, store: Store,
+  options: Options = {}): World {
   return new World(canvas, store, options);
 }

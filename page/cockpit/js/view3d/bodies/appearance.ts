@@ -5,26 +5,24 @@
 import { bus, car, truck, van, withLamps } from './motor_vehicles.js';
 import { bicycle, motorcycle, pedestrian, prism } from './others.js';
 
-/** @import { SceneObject, SceneVehicle } from '../../messages.js' */
-/** @import { Body } from './motor_vehicles.js' */
+import type { SceneObject, SceneVehicle } from '../../messages.js';
+import type { Body } from './motor_vehicles.js';
 
-/**
- * @typedef {object} Appearance
- * @property {string} key things with the same key share their body
- * @property {() => Body} build the body, at its own size
- * @property {number|null} length to which it is stretched; null for its own size [m]
- * @property {number|null} width [m]
- * @property {number|null} height [m]
- * @property {number} paint its colour, which only distinguishes things
- */
+export interface Appearance {
+  key: string; // things with the same key share their body
+  build: () => Body; // the body, at its own size
+  length: number | null; // to which it is stretched; null for its own size [m]
+  width: number | null; // [m]
+  height: number | null; // [m]
+  paint: number; // its colour, which only distinguishes things
+}
 
 // Usual colours of cars: silver, grey, black, white, red, blue, brown, green.
 const PAINTS = [0xb9bec4, 0x6d737b, 0x22252a, 0xe9eaec, 0x8f1d22, 0x24426f, 0x5a4636, 0x2f4f43];
 const CLOTHES = [0x3f6ea8, 0xa33c3c, 0x4b7f52, 0xc79a3a, 0x6b5a8e, 0xd9d4c8];
 const STATIC_PAINT = 0xc8641e;
 // Heights of things whose type defines them better than their outline [m].
-/** @type {Record<string, number|undefined>} */
-const HEIGHTS = {
+const HEIGHTS: Record<string, number | undefined> = {
   building: 8, pillar: 4, median_strip: 0.2, medianStrip: 0.2, roadBoundary: 0.8,
   constructionZone: 1.1,
 };
@@ -36,11 +34,8 @@ const CARS = new Set(['car', 'parkedVehicle', 'taxi', 'priorityVehicle', 'unknow
 
 /**
  * Choose the body of a driven vehicle: the wheels of cars and trucks are where its model has them.
- *
- * @param {SceneVehicle} vehicle
- * @returns {Appearance}
  */
-export function ofVehicle(vehicle) {
+export function ofVehicle(vehicle: SceneVehicle): Appearance {
   const { id, type, shape, wheelbase, rear_to_center: rear, driver_place: place } = vehicle;
   if (type !== 'car' && type !== 'truck') {
     return ofObject({ id, type, role: 'traffic', shape });
@@ -58,13 +53,8 @@ export function ofVehicle(vehicle) {
   };
 }
 
-/**
- * Choose the body of an object by its type and size, from CommonRoad.
- *
- * @param {SceneObject} object
- * @returns {Appearance}
- */
-export function ofObject({ id, type, role, shape }) {
+/** Choose the body of an object by its type and size, from CommonRoad. */
+export function ofObject({ id, type, role, shape }: SceneObject): Appearance {
   const { kind, length, width } = shape;
   const size = { length, width, height: null };
   if (type === 'pedestrian') {
@@ -88,20 +78,14 @@ export function ofObject({ id, type, role, shape }) {
     build: () => prism(vertices, HEIGHTS[type] ?? USUAL_HEIGHT_M), paint: STATIC_PAINT };
 }
 
-/**
- * @param {number} length [m]
- * @returns {[name: string, build: typeof car]}
- */
-function motorVehicle(length) {
+/** @param length [m] */
+function motorVehicle(length: number): [name: string, build: typeof car] {
   return length <= LONGEST_CAR_M ? ['car', car] : length <= LONGEST_VAN_M ? ['van', van]
     : ['truck', truck];
 }
 
-/**
- * @param {SceneObject['shape']} shape
- * @returns {number[]} flat
- */
-function outlineOf({ kind, length, width, vertices }) {
+/** @returns flat */
+function outlineOf({ kind, length, width, vertices }: SceneObject['shape']): number[] {
   if (kind === 'polygon') {
     return vertices;
   }
@@ -115,11 +99,7 @@ function outlineOf({ kind, length, width, vertices }) {
   return [-l, -w, l, -w, l, w, -l, w];
 }
 
-/**
- * @param {number[]} colors
- * @param {string} id
- */
-function pick(colors, id) {
+function pick(colors: number[], id: string) {
   let hash = 7;
   for (const letter of id) {
     hash = (31 * hash + letter.charCodeAt(0)) % 65521;

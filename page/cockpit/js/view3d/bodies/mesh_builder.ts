@@ -2,12 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Builder of a body's triangles, with their colours and with normals that keep edges. */
 
-/** @typedef {[x: number, y: number, z: number]} Point [m] */
-/**
- * Reflected share of the light, and whether it is a shade of the vehicle's own colour.
- *
- * @typedef {[red: number, green: number, blue: number, isPaint?: boolean]} Tint
- */
+export type Point = [x: number, y: number, z: number]; // [m]
+/** Reflected share of the light, and whether it is a shade of the vehicle's own colour. */
+export type Tint = [red: number, green: number, blue: number, isPaint?: boolean];
 
 // Faces that meet at a smaller angle are shaded as one curved face.
 const SMOOTH_BELOW = Math.cos((38 * Math.PI) / 180);
@@ -15,26 +12,17 @@ const ROUNDED = 1000;
 
 /** A collection of triangles; counter-clockwise ones are visible from outside. */
 export class MeshBuilder {
-  /** @type {number[]} */
-  #positions = [];
-  /** @type {number[]} */
-  #colors = [];
-  /** @type {boolean[]} */
-  #painted = [];
+  #positions: number[] = [];
+  #colors: number[] = [];
+  #painted: boolean[] = [];
 
   /** Return how many triangles there are. */
   get triangles() {
     return this.#positions.length / 9;
   }
 
-  /**
-   * Add a flat polygon, convex and counter-clockwise from outside.
-   *
-   * @param {Point[]} corners
-   * @param {Tint} tint
-   * @returns {this}
-   */
-  polygon(corners, tint) {
+  /** Add a flat polygon, convex and counter-clockwise from outside. */
+  polygon(corners: Point[], tint: Tint): this {
     const [red, green, blue, isPaint = false] = tint;
     for (let i = 2; i < corners.length; i += 1) {
       this.#painted.push(isPaint);
@@ -49,17 +37,12 @@ export class MeshBuilder {
   /**
    * Add a box, which may be narrower at its top.
    *
-   * @param {Point} low
-   * @param {Point} high
-   * @param {Tint} tint
-   * @param {{x?: number, y?: number}} [taper] how much narrower the top is, on each side [m]
-   * @returns {this}
+   * @param taper how much narrower the top is, on each side [m]
    */
-  box([x0, y0, z0], [x1, y1, z1], tint, { x = 0, y = 0 } = {}) {
-    /** @type {Point[]} */
-    const low = [[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0]];
-    /** @type {Point[]} */
-    const high = [[x0 + x, y0 + y, z1], [x1 - x, y0 + y, z1], [x1 - x, y1 - y, z1],
+  box([x0, y0, z0]: Point, [x1, y1, z1]: Point, tint: Tint,
+    { x = 0, y = 0 }: { x?: number; y?: number } = {}): this {
+    const low: Point[] = [[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0]];
+    const high: Point[] = [[x0 + x, y0 + y, z1], [x1 - x, y0 + y, z1], [x1 - x, y1 - y, z1],
       [x0 + x, y1 - y, z1]];
     this.polygon([...low].reverse(), tint).polygon(high, tint);
     for (let i = 0; i < 4; i += 1) {
@@ -72,18 +55,15 @@ export class MeshBuilder {
   /**
    * Add a round body along an axis, with its ends.
    *
-   * @param {Point} middle
-   * @param {'x'|'y'|'z'} axis
-   * @param {number} length along the axis [m]
-   * @param {number} radius [m]
-   * @param {Tint} tint of its side
-   * @param {Tint} [ends] of its ends
-   * @param {number} [count] of sides
-   * @returns {this}
+   * @param length along the axis [m]
+   * @param radius [m]
+   * @param tint of its side
+   * @param ends of its ends
+   * @param count of sides
    */
-  cylinder(middle, axis, length, radius, tint, ends = tint, count = 14) {
-    /** @type {(angle: number, side: number) => Point} */
-    const at = (angle, side) => {
+  cylinder(middle: Point, axis: 'x' | 'y' | 'z', length: number, radius: number, tint: Tint,
+    ends = tint, count = 14): this {
+    const at = (angle: number, side: number): Point => {
       const u = radius * Math.cos(angle);
       const v = radius * Math.sin(angle);
       const along = side * 0.5 * length;
@@ -104,13 +84,10 @@ export class MeshBuilder {
   /**
    * Add a skin over cross-sections, all of the same number of points.
    *
-   * @param {Point[][]} sections from the back to the front, each from the right to the left
-   *   over the top
-   * @param {(section: number, strip: number) => Tint} tint of the strip between a section and the
-   *   next, and between a point and the next
-   * @returns {this}
+   * @param sections from the back to the front, each from the right to the left over the top
+   * @param tint of the strip between a section and the next, and between a point and the next
    */
-  skin(sections, tint) {
+  skin(sections: Point[][], tint: (section: number, strip: number) => Tint): this {
     for (let i = 0; i + 1 < sections.length; i += 1) {
       for (let j = 0; j + 1 < sections[i].length; j += 1) {
         this.polygon([sections[i][j], sections[i + 1][j], sections[i + 1][j + 1],
@@ -123,13 +100,10 @@ export class MeshBuilder {
   /**
    * Return the painted triangles, or all others.
    *
-   * @param {boolean} painted
-   * @returns {{positions: Float32Array, normals: Float32Array, colors: Float32Array}} of all
-   *   corners, flat, three numbers each
+   * @returns of all corners, flat, three numbers each
    */
-  arrays(painted) {
-    /** @type {(values: ArrayLike<number>) => Float32Array} */
-    const chosen = (values) => new Float32Array(Array.prototype.filter.call(
+  arrays(painted: boolean): Record<'positions' | 'normals' | 'colors', Float32Array> {
+    const chosen = (values: ArrayLike<number>) => new Float32Array(Array.prototype.filter.call(
       values, (_, i) => this.#painted[Math.floor(i / 9)] === painted));
     return {
       positions: chosen(this.#positions), normals: chosen(smoothNormals(this.#positions)),
@@ -138,16 +112,10 @@ export class MeshBuilder {
   }
 }
 
-/**
- * @param {number[]} positions
- * @returns {Float32Array}
- */
-function smoothNormals(positions) {
+function smoothNormals(positions: number[]): Float32Array {
   const faces = faceNormals(positions);
-  /** @type {Map<string, number[]>} */
-  const around = new Map();
-  /** @type {(corner: number) => string} */
-  const keyOf = (corner) => [0, 1, 2].map(
+  const around = new Map<string, number[]>();
+  const keyOf = (corner: number): string => [0, 1, 2].map(
     (axis) => Math.round(positions[3 * corner + axis] * ROUNDED)).join();
   for (let corner = 0; 3 * corner < positions.length; corner += 1) {
     const key = keyOf(corner);
@@ -172,12 +140,8 @@ function smoothNormals(positions) {
   return normals;
 }
 
-/**
- * @param {number[]} positions
- * @returns {{area: number[], unit: number[]}[]} of each triangle, as long as twice its area, and
- *   of length 1
- */
-function faceNormals(positions) {
+/** @returns of each triangle, as long as twice its area, and of length 1 */
+function faceNormals(positions: number[]): { area: number[]; unit: number[] }[] {
   const faces = [];
   for (let i = 0; i < positions.length; i += 9) {
     const [ax, ay, az, bx, by, bz, cx, cy, cz] = positions.slice(i, i + 9);

@@ -4,75 +4,54 @@
 
 import { MeshBuilder } from './mesh_builder.js';
 
-/** @import { Point, Tint } from './mesh_builder.js' */
+import type { Point, Tint } from './mesh_builder.js';
 
-/**
- * A body of a given size, with the places of its wheels and lamps.
- *
- * @typedef {object} Body
- * @property {MeshBuilder} mesh around its middle, at size `length` by `width` by `height`
- * @property {number} length [m]
- * @property {number} width [m]
- * @property {number} height [m]
- * @property {{front: number, rear: number, track: number, radius: number, width: number}|null
- *   } wheels axles ahead of the middle, distance of the tyres' outer faces, their size [m]
- * @property {{front: Point, rear: Point, size: [width: number, height: number]}|null} lamps the
- *   left ones; the right ones mirror them [m]
- */
-
-/** @typedef {{front: number, rear: number}} Axles ahead of the middle [m] */
-
-/** @type {Tint} */
-const PAINT = [1, 1, 1, true];
-/** @type {Tint} */
-const GLASS = [0.07, 0.09, 0.12];
-/** @type {Tint} */
-const TRIM = [0.05, 0.05, 0.06];
-/** @type {Tint} */
-const HEADLIGHT = [1.5, 1.5, 1.4];
-/** @type {Tint} */
-const LENS = [0.35, 0.03, 0.03];
-/** @type {Tint} */
-const PLATE = [1.3, 1.3, 1.25];
-
-/**
- * A section across a car: half widths and heights.
- *
- * @typedef {object} Section
- * @property {number} x ahead of the middle [m]
- * @property {number} half of the flank's width [m]
- * @property {number} sill [m]
- * @property {number} belt lower edge of the windows, or the bonnet's edge [m]
- * @property {number} top [m]
- * @property {number} roof half width of the roof, or where the bonnet's crown begins [m]
- */
-
-/**
- * @param {Section} section
- * @returns {Point[]} from the right sill over the roof to the left one
- */
-function outline({ x, half, sill, belt, top, roof }) {
-  const middle = sill + 0.52 * (belt - sill);
-  /** @type {[number, number][]} */
-  const left = [[0, top + 0.02], [0.82 * roof, top], [roof, top - 0.05], [half * 0.97, belt],
-    [half, middle], [half * 0.96, sill]];
-  /** @type {Point[]} */
-  const points = left.slice(1).reverse().map(([y, z]) => [x, -y, z]);
-  return [...points, ...left.map(([y, z]) => /** @type {Point} */ ([x, y, z]))];
+/** A body of a given size, with the places of its wheels and lamps. */
+export interface Body {
+  mesh: MeshBuilder; // around its middle, at size `length` by `width` by `height`
+  length: number; // [m]
+  width: number; // [m]
+  height: number; // [m]
+  // axles ahead of the middle, distance of the tyres' outer faces, their size [m]
+  wheels: { front: number; rear: number; track: number; radius: number; width: number } | null;
+  // the left ones; the right ones mirror them [m]
+  lamps: { front: Point; rear: Point; size: [width: number, height: number] } | null;
 }
 
-/**
- * A saloon of five seats.
- *
- * @param {Axles} [axles]
- * @returns {Body}
- */
-export function car({ front, rear } = { front: 1.35, rear: -1.32 }) {
+export interface Axles { front: number; rear: number } // ahead of the middle [m]
+
+const PAINT: Tint = [1, 1, 1, true];
+const GLASS: Tint = [0.07, 0.09, 0.12];
+const TRIM: Tint = [0.05, 0.05, 0.06];
+const HEADLIGHT: Tint = [1.5, 1.5, 1.4];
+const LENS: Tint = [0.35, 0.03, 0.03];
+const PLATE: Tint = [1.3, 1.3, 1.25];
+
+/** A section across a car: half widths and heights. */
+export interface Section {
+  x: number; // ahead of the middle [m]
+  half: number; // of the flank's width [m]
+  sill: number; // [m]
+  belt: number; // lower edge of the windows, or the bonnet's edge [m]
+  top: number; // [m]
+  roof: number; // half width of the roof, or where the bonnet's crown begins [m]
+}
+
+/** @returns from the right sill over the roof to the left one */
+function outline({ x, half, sill, belt, top, roof }: Section): Point[] {
+  const middle = sill + 0.52 * (belt - sill);
+  const left: [number, number][] = [[0, top + 0.02], [0.82 * roof, top], [roof, top - 0.05],
+    [half * 0.97, belt], [half, middle], [half * 0.96, sill]];
+  const points: Point[] = left.slice(1).reverse().map(([y, z]) => [x, -y, z]);
+  return [...points, ...left.map(([y, z]): Point => [x, y, z])];
+}
+
+/** A saloon of five seats. */
+export function car({ front, rear }: Axles = { front: 1.35, rear: -1.32 }): Body {
   const [length, width, height] = [4.5, 1.8, 1.44];
   const l = length / 2;
   const w = width / 2;
-  /** @type {Section[]} */
-  const sections = [
+  const sections: Section[] = [
     { x: -l, half: 0.9 * w, sill: 0.4, belt: 0.82, top: 0.86, roof: 0.72 * w },
     { x: -l + 0.14, half: 0.97 * w, sill: 0.24, belt: 0.93, top: 1.0, roof: 0.76 * w },
     { x: -l + 0.55, half: w, sill: 0.22, belt: 0.95, top: 1.03, roof: 0.76 * w },
@@ -102,18 +81,12 @@ export function car({ front, rear } = { front: 1.35, rear: -1.32 }) {
     lamps: { front: [l - 0.07, 0.68 * w, 0.62], rear: [-l, 0.7 * w, 0.74], size: [0.3, 0.14] } };
 }
 
-/**
- * A closed van, or a small bus.
- *
- * @param {Axles} [axles]
- * @returns {Body}
- */
-export function van({ front, rear } = { front: 1.72, rear: -1.6 }) {
+/** A closed van, or a small bus. */
+export function van({ front, rear }: Axles = { front: 1.72, rear: -1.6 }): Body {
   const [length, width, height] = [5.4, 2.0, 2.2];
   const l = length / 2;
   const w = width / 2;
-  /** @type {Section[]} */
-  const sections = [
+  const sections: Section[] = [
     { x: -l, half: 0.97 * w, sill: 0.35, belt: 1.15, top: height - 0.06, roof: 0.86 * w },
     { x: -l + 0.1, half: w, sill: 0.28, belt: 1.18, top: height - 0.02, roof: 0.88 * w },
     { x: 0.7, half: w, sill: 0.26, belt: 1.18, top: height - 0.02, roof: 0.88 * w },
@@ -138,13 +111,8 @@ export function van({ front, rear } = { front: 1.72, rear: -1.6 }) {
     lamps: { front: [l - 0.06, 0.72 * w, 0.82], rear: [-l, 0.88 * w, 1.0], size: [0.16, 0.34] } };
 }
 
-/**
- * A truck with its load in a box.
- *
- * @param {Axles} [axles]
- * @returns {Body}
- */
-export function truck({ front, rear } = { front: 3.65, rear: -3.1 }) {
+/** A truck with its load in a box. */
+export function truck({ front, rear }: Axles = { front: 3.65, rear: -3.1 }): Body {
   const [length, width, height] = [10, 2.5, 3.5];
   const l = length / 2;
   const w = width / 2;
@@ -159,8 +127,7 @@ export function truck({ front, rear } = { front: 3.65, rear: -3.1 }) {
     [l - 0.115, 0.84 * w, 2.5], [l - 0.115, -0.84 * w, 2.5]], GLASS)
     .box([l - 0.06, -0.8 * w, 0.75], [l + 0.01, 0.8 * w, 1.15], TRIM);
   for (const side of [-1, 1]) {
-    /** @type {Point[]} */
-    const window = [[cab + 0.75, side * 1.0 * w, 1.7], [l - 0.35, side * 1.0 * w, 1.7],
+    const window: Point[] = [[cab + 0.75, side * 1.0 * w, 1.7], [l - 0.35, side * 1.0 * w, 1.7],
       [l - 0.45, side * 0.97 * w, 2.45], [cab + 0.75, side * 0.97 * w, 2.45]];
     mesh.polygon(side < 0 ? window : window.reverse(), GLASS);
   }
@@ -170,13 +137,8 @@ export function truck({ front, rear } = { front: 3.65, rear: -3.1 }) {
     lamps: { front: [l + 0.01, 0.8 * w, 0.62], rear: [-l, 0.8 * w, 0.8], size: [0.34, 0.16] } };
 }
 
-/**
- * A city bus.
- *
- * @param {Axles} [axles]
- * @returns {Body}
- */
-export function bus({ front, rear } = { front: 3.3, rear: -2.7 }) {
+/** A city bus. */
+export function bus({ front, rear }: Axles = { front: 3.3, rear: -2.7 }): Body {
   const [length, width, height] = [12, 2.55, 3.1];
   const l = length / 2;
   const w = width / 2;
@@ -196,13 +158,8 @@ export function bus({ front, rear } = { front: 3.3, rear: -2.7 }) {
     lamps: { front: [l, 0.78 * w, 0.7], rear: [-l, 0.84 * w, 1.0], size: [0.28, 0.2] } };
 }
 
-/**
- * Close a skin at both ends.
- *
- * @param {MeshBuilder} mesh
- * @param {Section[]} sections
- */
-function ends(mesh, sections) {
+/** Close a skin at both ends. */
+function ends(mesh: MeshBuilder, sections: Section[]) {
   const back = outline(sections[0]);
   const front = outline(sections[sections.length - 1]);
   mesh.polygon(back, PAINT).polygon(front.reverse(), PAINT);
@@ -216,13 +173,12 @@ function ends(mesh, sections) {
 }
 
 /**
- * @param {MeshBuilder} mesh
- * @param {number} x of both [m]
- * @param {number} half width of the flank [m]
- * @param {number} z [m]
- * @param {number} [size] height [m]
+ * @param x of both [m]
+ * @param half width of the flank [m]
+ * @param z [m]
+ * @param size height [m]
  */
-function mirrors(mesh, x, half, z, size = 0.14) {
+function mirrors(mesh: MeshBuilder, x: number, half: number, z: number, size = 0.14) {
   for (const side of [-1, 1]) {
     const [y0, y1] = [side * half * 0.95, side * (half + 0.18)].sort((a, b) => a - b);
     mesh.box([x - 0.05, y0, z], [x + 0.08, y1, z + size], TRIM);
@@ -232,11 +188,10 @@ function mirrors(mesh, x, half, z, size = 0.14) {
 /**
  * Dark discs behind the wheels.
  *
- * @param {MeshBuilder} mesh
- * @param {{front: number, rear: number, radius: number}} wheels
- * @param {number} half width of the flank [m]
+ * @param half width of the flank [m]
  */
-function arches(mesh, { front, rear, radius }, half) {
+function arches(mesh: MeshBuilder,
+  { front, rear, radius }: { front: number; rear: number; radius: number }, half: number) {
   for (const x of [front, rear]) {
     mesh.cylinder([x, 0, radius + 0.05], 'y', 2 * half + 0.008, radius + 0.05, TRIM, TRIM, 18);
   }
@@ -245,10 +200,9 @@ function arches(mesh, { front, rear, radius }, half) {
 /**
  * Add the unlit lamps to a vehicle: headlights and red lenses.
  *
- * @param {Body} body
- * @returns {Body} the same
+ * @returns the same
  */
-export function withLamps(body) {
+export function withLamps(body: Body): Body {
   if (body.lamps !== null) {
     const { front, rear, size: [width, height] } = body.lamps;
     for (const side of [-1, 1]) {
@@ -260,14 +214,12 @@ export function withLamps(body) {
 }
 
 /**
- * @param {MeshBuilder} mesh
- * @param {Point} middle
- * @param {number} side 1 for the left one, -1 for the right one
- * @param {number} width [m]
- * @param {number} height [m]
- * @param {Tint} tint
+ * @param side 1 for the left one, -1 for the right one
+ * @param width [m]
+ * @param height [m]
  */
-function lamp(mesh, [x, y, z], side, width, height, tint) {
+function lamp(mesh: MeshBuilder, [x, y, z]: Point, side: number, width: number, height: number,
+  tint: Tint) {
   mesh.box([x - 0.03, side * y - 0.5 * width, z - 0.5 * height],
     [x + 0.03, side * y + 0.5 * width, z + 0.5 * height], tint);
 }

@@ -4,27 +4,18 @@
 
 import { MeshBuilder } from './mesh_builder.js';
 
-/** @import { Body } from './motor_vehicles.js' */
-/** @import { Point, Tint } from './mesh_builder.js' */
+import type { Body } from './motor_vehicles.js';
+import type { Point, Tint } from './mesh_builder.js';
 
-/** @type {Tint} */
-const PAINT = [1, 1, 1, true];
-/** @type {Tint} */
-const DARK = [0.06, 0.06, 0.07];
-/** @type {Tint} */
-const METAL = [0.45, 0.46, 0.48];
-/** @type {Tint} */
-const SKIN = [0.75, 0.55, 0.42];
-/** @type {Tint} */
-const CLOTH = [0.1, 0.13, 0.2];
+const PAINT: Tint = [1, 1, 1, true];
+const DARK: Tint = [0.06, 0.06, 0.07];
+const METAL: Tint = [0.45, 0.46, 0.48];
+const SKIN: Tint = [0.75, 0.55, 0.42];
+const CLOTH: Tint = [0.1, 0.13, 0.2];
 const SIDES = 10;
 
-/**
- * A bicycle with its rider.
- *
- * @returns {Body}
- */
-export function bicycle() {
+/** A bicycle with its rider. */
+export function bicycle(): Body {
   const mesh = new MeshBuilder()
     .box([-0.5, -0.02, 0.5], [0.45, 0.02, 0.56], METAL)
     .box([-0.22, -0.02, 0.3], [-0.16, 0.02, 0.95], METAL)
@@ -36,12 +27,8 @@ export function bicycle() {
     wheels: { front: 0.52, rear: -0.52, track: 0.03, radius: 0.34, width: 0.04 } };
 }
 
-/**
- * A motorcycle with its rider.
- *
- * @returns {Body}
- */
-export function motorcycle() {
+/** A motorcycle with its rider. */
+export function motorcycle(): Body {
   const mesh = new MeshBuilder()
     .box([-0.55, -0.17, 0.42], [0.35, 0.17, 0.72], DARK, { x: 0.05, y: 0.03 })
     .box([-0.05, -0.17, 0.7], [0.45, 0.17, 0.95], PAINT, { x: 0.12, y: 0.06 })
@@ -54,12 +41,8 @@ export function motorcycle() {
     lamps: { front: [0.7, 0.04, 0.93], rear: [-0.86, 0.05, 0.8], size: [0.1, 0.1] } };
 }
 
-/**
- * A pedestrian.
- *
- * @returns {Body}
- */
-export function pedestrian() {
+/** A pedestrian. */
+export function pedestrian(): Body {
   const mesh = new MeshBuilder();
   for (const side of [-1, 1]) {
     mesh.cylinder([0.04 * side, 0.1 * side, 0.42], 'z', 0.84, 0.085, CLOTH, CLOTH, SIDES)
@@ -76,13 +59,11 @@ export function pedestrian() {
 /**
  * A thing of which only the outline is known.
  *
- * @param {number[]} vertices of its outline, flat, either way around [m]
- * @param {number} height [m]
- * @returns {Body}
+ * @param vertices of its outline, flat, either way around [m]
+ * @param height [m]
  */
-export function prism(vertices, height) {
-  /** @type {Point[]} */
-  const low = [];
+export function prism(vertices: number[], height: number): Body {
+  const low: Point[] = [];
   let twiceArea = 0;
   for (let i = 0; i < vertices.length; i += 2) {
     const next = (i + 2) % vertices.length;
@@ -92,8 +73,7 @@ export function prism(vertices, height) {
   if (twiceArea < 0) {
     low.reverse();
   }
-  /** @type {Point[]} */
-  const high = low.map(([x, y]) => [x, y, height]);
+  const high: Point[] = low.map(([x, y]) => [x, y, height]);
   const mesh = new MeshBuilder().polygon(high, PAINT);
   low.forEach((corner, i) => {
     const next = (i + 1) % low.length;
@@ -114,15 +94,14 @@ export function prism(vertices, height) {
 }
 
 /**
- * @param {MeshBuilder} mesh
- * @param {number} x of the seat [m]
- * @param {number} z of the seat [m]
- * @param {number} lean how far the shoulders are ahead [m]
+ * @param x of the seat [m]
+ * @param z of the seat [m]
+ * @param lean how far the shoulders are ahead [m]
  */
-function rider(mesh, x, z, lean) {
-  /** @type {(at: number, half: number, height: number) => Point[]} */
-  const section = (at, half, height) => [[at + 0.1, -half, height], [at + 0.1, half, height],
-    [at - 0.1, half, height], [at - 0.1, -half, height]];
+function rider(mesh: MeshBuilder, x: number, z: number, lean: number) {
+  const section = (at: number, half: number, height: number): Point[] => [
+    [at + 0.1, -half, height], [at + 0.1, half, height], [at - 0.1, half, height],
+    [at - 0.1, -half, height]];
   const hip = section(x, 0.16, z);
   const chest = section(x + lean, 0.21, z + 0.52);
   hip.forEach((corner, i) => {
@@ -139,16 +118,10 @@ function rider(mesh, x, z, lean) {
   ball(mesh, [x + lean + 0.06, 0, z + 0.72], 0.14, DARK);
 }
 
-/**
- * @param {MeshBuilder} mesh
- * @param {Point} middle
- * @param {number} radius [m]
- * @param {Tint} tint
- */
-function ball(mesh, [x, y, z], radius, tint) {
+/** @param radius [m] */
+function ball(mesh: MeshBuilder, [x, y, z]: Point, radius: number, tint: Tint) {
   const rings = 5;
-  /** @type {(ring: number, i: number) => Point} */
-  const at = (ring, i) => {
+  const at = (ring: number, i: number): Point => {
     const up = -Math.PI / 2 + (Math.PI * ring) / rings;
     const around = (2 * Math.PI * i) / SIDES;
     return [x + radius * Math.cos(up) * Math.cos(around),

@@ -4,30 +4,21 @@
 
 import { MeshBuilder } from './mesh_builder.js';
 
-/** @import { Point, Tint } from './mesh_builder.js' */
-/** @import { Body } from './motor_vehicles.js' */
+import type { Point, Tint } from './mesh_builder.js';
+import type { Body } from './motor_vehicles.js';
 
-/** @type {Tint} */
-const PAINT = [1, 1, 1, true];
-/** @type {Tint} */
-const GLASS = [0.07, 0.09, 0.12];
-/** @type {Tint} */
-const TRIM = [0.05, 0.05, 0.06];
-/** @type {Tint} */
-const HEADLIGHT = [1.5, 1.5, 1.4];
-/** @type {Tint} */
-const LENS = [0.35, 0.03, 0.03];
-const LOAD = /** @type {Tint} */ ([0.9, 0.9, 0.88]);
+const PAINT: Tint = [1, 1, 1, true];
+const GLASS: Tint = [0.07, 0.09, 0.12];
+const TRIM: Tint = [0.05, 0.05, 0.06];
+const HEADLIGHT: Tint = [1.5, 1.5, 1.4];
+const LENS: Tint = [0.35, 0.03, 0.03];
+const LOAD: Tint = [0.9, 0.9, 0.88];
 const WHEEL_CORNERS = 6;
 
-/**
- * Sections across a vehicle as shares of its half length, half width and height.
- *
- * @typedef {[x: number, half: number, sill: number, belt: number, top: number, roof: number]} Row
- */
+/** Sections across a vehicle as shares of its half length, half width and height. */
+export type Row = [x: number, half: number, sill: number, belt: number, top: number, roof: number];
 
-/** @type {Record<string, {rows: Row[], glass: number[], windows: number[]}|undefined>} */
-const SKINS = {
+const SKINS: Record<string, { rows: Row[]; glass: number[]; windows: number[] } | undefined> = {
   car: { rows: [[-1, 0.93, 0.24, 0.57, 0.6, 0.73], [-0.76, 1, 0.15, 0.66, 0.71, 0.76],
     [-0.46, 1, 0.14, 0.66, 0.96, 0.65], [0.11, 1, 0.13, 0.65, 0.97, 0.65],
     [0.46, 1, 0.13, 0.64, 0.69, 0.76], [1, 0.82, 0.18, 0.42, 0.46, 0.64]],
@@ -40,11 +31,10 @@ const SKINS = {
 /**
  * Make the plain shape of a body, with the same size and places of windows, wheels and lamps.
  *
- * @param {string} key of its appearance, which begins with its kind
- * @param {Body} body
- * @returns {MeshBuilder|null} null if it has few triangles anyway
+ * @param key of its appearance, which begins with its kind
+ * @returns null if it has few triangles anyway
  */
-export function plainBody(key, body) {
+export function plainBody(key: string, body: Body): MeshBuilder | null {
   const [kind] = key.split(' ');
   const { length, width, height } = body;
   const [l, w] = [length / 2, width / 2];
@@ -71,31 +61,24 @@ export function plainBody(key, body) {
 }
 
 /**
- * @param {MeshBuilder} mesh
- * @param {NonNullable<typeof SKINS[string]>} skin
- * @param {number} l half length [m]
- * @param {number} w half width [m]
- * @param {number} height [m]
+ * @param l half length [m]
+ * @param w half width [m]
+ * @param height [m]
  */
-function addSkin(mesh, { rows, glass, windows }, l, w, height) {
+function addSkin(mesh: MeshBuilder, { rows, glass, windows }: NonNullable<typeof SKINS[string]>,
+  l: number, w: number, height: number) {
   const sections = rows.map(([x, half, sill, belt, top, roof]) => {
-    /** @type {Point[]} */
-    const left = [[x * l, roof * w, top * height], [x * l, half * w, belt * height],
+    const left: Point[] = [[x * l, roof * w, top * height], [x * l, half * w, belt * height],
       [x * l, 0.97 * half * w, sill * height]];
-    return [...left.map(([u, v, z]) => /** @type {Point} */ ([u, -v, z])).reverse(), ...left];
+    return [...left.map(([u, v, z]) => [u, -v, z] as Point).reverse(), ...left];
   });
   mesh.skin(sections, (i, j) => ((j === 2 && glass.includes(i))
     || ((j === 1 || j === 3) && windows.includes(i)) ? GLASS : PAINT));
   mesh.polygon(sections[0], PAINT).polygon(sections[sections.length - 1].toReversed(), PAINT);
 }
 
-/**
- * Dark sides of the wheels, a little before the flanks.
- *
- * @param {MeshBuilder} mesh
- * @param {Body} body
- */
-function addWheels(mesh, { wheels, width }) {
+/** Dark sides of the wheels, a little before the flanks. */
+function addWheels(mesh: MeshBuilder, { wheels, width }: Body) {
   if (wheels === null) {
     return;
   }
@@ -104,29 +87,25 @@ function addWheels(mesh, { wheels, width }) {
     for (const side of [1, -1]) {
       mesh.polygon(Array.from({ length: WHEEL_CORNERS }, (_, i) => {
         const angle = -side * 2 * Math.PI * (i + 0.5) / WHEEL_CORNERS;
-        return /** @type {Point} */ ([x + wheels.radius * 1.08 * Math.cos(angle), side * half,
-          wheels.radius * (1.02 + 1.02 * Math.sin(angle))]);
+        return [x + wheels.radius * 1.08 * Math.cos(angle), side * half,
+          wheels.radius * (1.02 + 1.02 * Math.sin(angle))];
       }), TRIM);
     }
   }
 }
 
-/**
- * @param {MeshBuilder} mesh
- * @param {Body} body
- */
-function addLamps(mesh, { lamps }) {
+function addLamps(mesh: MeshBuilder, { lamps }: Body) {
   if (lamps === null) {
     return;
   }
   const { front, rear, size: [width, height] } = lamps;
   for (const side of [1, -1]) {
-    for (const [[x, y, z], off, tint] of /** @type {[Point, number, Tint][]} */ (
-      [[front, 0.06, HEADLIGHT], [rear, -0.04, LENS]])) {
+    const both: [Point, number, Tint][] = [[front, 0.06, HEADLIGHT], [rear, -0.04, LENS]];
+    for (const [[x, y, z], off, tint] of both) {
       const [u0, u1] = [side * y - width / 2, side * y + width / 2];
-      const corners = /** @type {Point[]} */ ([[x + off, u0, z - height / 2],
+      const corners: Point[] = [[x + off, u0, z - height / 2],
         [x + off, u1, z - height / 2], [x + off, u1, z + height / 2],
-        [x + off, u0, z + height / 2]]);
+        [x + off, u0, z + height / 2]];
       mesh.polygon(off > 0 ? corners : corners.reverse(), tint);
     }
   }

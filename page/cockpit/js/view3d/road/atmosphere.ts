@@ -4,30 +4,28 @@
 
 import { airFog, extinction, fogAsAirDoes } from './fog.js';
 
-/** @import { BufferGeometry, Group, Mesh, ShaderMaterial } from 'three' */
-/** @import { Environment } from '../../messages.js' */
-/** @typedef {typeof import('../three.js')} Three */
-/** @typedef {Mesh<BufferGeometry, ShaderMaterial>} Sky */
+import type { BufferGeometry, Group, Mesh, ShaderMaterial } from 'three';
+import type { Environment } from '../../messages.js';
+import type { Three } from '../three.js';
+
+export type Sky = Mesh<BufferGeometry, ShaderMaterial>;
 
 // The sky is seen through a layer of haze of this height [m].
 const HAZE_M = 250;
 
-/**
- * The look of a time of day; colours as on the screen.
- *
- * @typedef {object} Daylight
- * @property {number} zenith
- * @property {number} horizon on a clear day
- * @property {number} fog
- * @property {number} sun
- * @property {number} sun_light
- * @property {[number, number, number]} sun_from
- * @property {number} ground light that it reflects
- * @property {number} sky_light
- */
+/** The look of a time of day; colours as on the screen. */
+export interface Daylight {
+  zenith: number;
+  horizon: number; // on a clear day
+  fog: number;
+  sun: number;
+  sun_light: number;
+  sun_from: [number, number, number];
+  ground: number; // light that it reflects
+  sky_light: number;
+}
 
-/** @type {Record<Environment['light'], Daylight>} */
-const LIGHTS = {
+const LIGHTS: Record<Environment['light'], Daylight> = {
   day: { zenith: 0x4f86c6, horizon: 0xc9dbe8, fog: 0xc4c9cb, sun: 0xfff4e0, sun_light: 1.9,
     sun_from: [-0.45, -0.6, 0.75], ground: 0x9a9c88, sky_light: 2.0 },
   dusk: { zenith: 0x34466e, horizon: 0xc9ab97, fog: 0x565b66, sun: 0xffa66a, sun_light: 0.5,
@@ -82,26 +80,25 @@ const AROUND = 24;
 
 /** The sky of a scene, its lights, and the fog for the scene of three.js. */
 export class Atmosphere {
-  /** @type {Group} */
-  group;
+  group: Group;
   #three;
   #sky;
   #plainSky;
   #sun;
   #ambient;
+  /** The fog of every material. */
+  fog;
 
-  /** @param {Three} three the library */
-  constructor(three) {
+  /** @param three the library */
+  constructor(three: Three) {
     fogAsAirDoes(three);
     this.#three = three;
-    /** The fog of every material. */
     this.fog = airFog(three);
     this.group = new three.Group();
     const color = () => ({ value: new three.Color() });
     const uniforms = { zenith: color(), horizon: color(), fogTone: color(), sunTone: color(),
       sunFrom: { value: new three.Vector3() }, haze: { value: 0 }, encoded: { value: 0 } };
-    /** @type {(geometry: BufferGeometry, vertexShader: string, fragmentShader: string) => Sky} */
-    const sky = (geometry, vertexShader, fragmentShader) => {
+    const sky = (geometry: BufferGeometry, vertexShader: string, fragmentShader: string): Sky => {
       const mesh = new three.Mesh(geometry, new three.ShaderMaterial({ vertexShader,
         fragmentShader, side: three.DoubleSide, depthWrite: false, uniforms }));
       mesh.frustumCulled = false;
@@ -126,18 +123,14 @@ export class Atmosphere {
     return this.#sky.geometry.attributes.position.count / 3;
   }
 
-  /** @param {boolean} fine whether each pixel of the sky is computed, with the sun in it */
-  setFine(fine) {
+  /** @param fine whether each pixel of the sky is computed, with the sun in it */
+  setFine(fine: boolean) {
     this.#sky.visible = fine;
     this.#plainSky.visible = !fine;
   }
 
-  /**
-   * Show a time of day and a visibility.
-   *
-   * @param {Environment} environment
-   */
-  set({ light, visibility }) {
+  /** Show a time of day and a visibility. */
+  set({ light, visibility }: Environment) {
     const { Color } = this.#three;
     const look = LIGHTS[light];
     const haze = extinction(visibility) * HAZE_M;
@@ -171,11 +164,8 @@ export class Atmosphere {
   }
 }
 
-/**
- * @param {Three} three
- * @returns {BufferGeometry} a ball of radius 1 around the upward axis
- */
-function ringed(three) {
+/** @returns a ball of radius 1 around the upward axis */
+function ringed(three: Three): BufferGeometry {
   const positions = [];
   const indices = [];
   for (const [ring, height] of RINGS_DEG.entries()) {

@@ -2,27 +2,27 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The loss of contrast in fog (Koschmieder), as a number and for three.js. */
 
-/** @import { FogExp2 } from 'three' */
-/** @typedef {typeof import('../three.js')} Three */
+import type { FogExp2 } from 'three';
+import type { Three } from '../three.js';
 
 /**
  * Return the extinction of air: at the meteorological visibility 5 % of a contrast is left. As
  * usual, 3 replaces -ln 0.05 = 2.996.
  *
- * @param {number} visibility meteorological [m]
- * @returns {number} extinction coefficient [1/m]
+ * @param visibility meteorological [m]
+ * @returns extinction coefficient [1/m]
  */
-export function extinction(visibility) {
+export function extinction(visibility: number): number {
   return 3 / visibility;
 }
 
 /**
  * Return the share of a contrast that is left.
  *
- * @param {number} distance [m]
- * @param {number} visibility meteorological [m]
+ * @param distance [m]
+ * @param visibility meteorological [m]
  */
-export function contrastLeft(distance, visibility) {
+export function contrastLeft(distance: number, visibility: number) {
   return Math.exp(-extinction(visibility) * distance);
 }
 
@@ -63,9 +63,9 @@ const FRAGMENT = `#ifdef USE_FOG
 /**
  * Change the fog of all the library's materials to that of air; call before the first picture.
  *
- * @param {Three} three the library
+ * @param three the library
  */
-export function fogAsAirDoes(three) {
+export function fogAsAirDoes(three: Three) {
   three.ShaderChunk.fog_pars_vertex = DECLARED;
   three.ShaderChunk.fog_vertex = VERTEX;
   three.ShaderChunk.fog_pars_fragment = UNIFORMS;
@@ -77,10 +77,10 @@ export function fogAsAirDoes(three) {
  * Make the fog of a scene. Materials get its linear light, where the library would pass the colour
  * encoded for the screen.
  *
- * @param {Three} three the library
- * @returns {FogExp2} of no density
+ * @param three the library
+ * @returns of no density
  */
-export function airFog(three) {
+export function airFog(three: Three): FogExp2 {
   const fog = new three.FogExp2(0xffffff, 0);
   fog.color.getRGB = function getLight(target) {
     return Object.assign(target, { r: this.r, g: this.g, b: this.b });

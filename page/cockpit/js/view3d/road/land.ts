@@ -5,9 +5,9 @@
 import { MeshParts } from './mesh_parts.js';
 import { randomFrom } from './random.js';
 
-/** @import { Scene } from '../../messages.js' */
-/** @import { Origin } from '../local_origin.js' */
-/** @import { Heights, Rgb } from './mesh_parts.js' */
+import type { Scene } from '../../messages.js';
+import type { Origin } from '../local_origin.js';
+import type { Heights, Rgb } from './mesh_parts.js';
 
 // How far the land continues beyond the map [m].
 const MARGIN_M = 1200;
@@ -18,22 +18,20 @@ const TILES = 4;
 const BELOW_M = 0.04;
 // Depth below roads on hills, which the land's triangles follow only roughly [m].
 const UNDER_HILLS_M = 0.4;
-/** @type {Rgb} */
-const MEADOW = [104, 124, 78];
-/** @type {Rgb} */
-const FIELD = [140, 138, 94];
+const MEADOW: Rgb = [104, 124, 78];
+const FIELD: Rgb = [140, 138, 94];
 // Rank under everything else that is flat.
 const RANK = -2;
 
 /**
  * Build the land of a scene in tiles, of which a picture draws the visible ones.
  *
- * @param {Scene} scene the scene document
- * @param {Origin} origin
- * @returns {{tiles: MeshParts[], plain: MeshParts[], heightAt: Heights}} the same tiles with few
- *   triangles, none where the land is not flat, and its height at points within it [m]
+ * @param scene the scene document
+ * @returns the same tiles with few triangles, none where the land is not flat, and its height at
+ *   points within it [m]
  */
-export function buildLand(scene, origin) {
+export function buildLand(scene: Scene,
+  origin: Origin): { tiles: MeshParts[]; plain: MeshParts[]; heightAt: Heights } {
   const [xmin, ymin, xmax, ymax] = scene.bounds;
   const size = Math.max(xmax - xmin, ymax - ymin) + 2 * MARGIN_M;
   const cell = Math.max(size / MOST_CELLS, LEAST_CELL_M);
@@ -43,18 +41,15 @@ export function buildLand(scene, origin) {
   const heights = landHeights(scene, x0, y0, cell, count);
   const random = randomFrom(scene.id);
   const shares = Float64Array.from({ length: (count + 1) ** 2 }, random);
-  /** @type {Corner} */
-  const corner = (parts, row, column) => {
+  const corner: Corner = (parts, row, column) => {
     const at = row * (count + 1) + column;
-    const color = /** @type {Rgb} */ (MEADOW.map(
-      (value, i) => value + 0.55 * shares[at] * (FIELD[i] - value)));
+    const color = MEADOW.map(
+      (value, i) => value + 0.55 * shares[at] * (FIELD[i] - value)) as Rgb;
     return parts.vertex(x0 + column * cell, y0 + row * cell,
       heights === null ? -BELOW_M : heights[at], color, RANK);
   };
-  /** @type {MeshParts[]} */
-  const tiles = [];
-  /** @type {MeshParts[]} */
-  const plain = [];
+  const tiles: MeshParts[] = [];
+  const plain: MeshParts[] = [];
   const edge = Math.ceil(count / TILES);
   for (let row = 0; row < count; row += edge) {
     for (let column = 0; column < count; column += edge) {
@@ -74,36 +69,26 @@ export function buildLand(scene, origin) {
   } };
 }
 
-/**
- * @typedef {(parts: MeshParts, row: number, column: number) => number} Corner adds one of the
- * land's corners, and returns its index
- */
+/** Adds one of the land's corners, and returns its index. */
+export type Corner = (parts: MeshParts, row: number, column: number) => number;
 
-/**
- * @param {number} first
- * @param {number} last
- * @returns {number[]} both and all numbers between them
- */
-function rangeOf(first, last) {
+/** @returns both and all numbers between them */
+function rangeOf(first: number, last: number): number[] {
   return Array.from({ length: last - first + 1 }, (_, i) => first + i);
 }
 
-/**
- * @param {number[]} range
- * @returns {number[]} every fourth of it, and the last
- */
-function everyFourth(range) {
+/** @returns every fourth of it, and the last */
+function everyFourth(range: number[]): number[] {
   return range.filter((_, i) => i % 4 === 0 || i === range.length - 1);
 }
 
 /**
- * @param {MeshParts} parts empty
- * @param {Corner} corner
- * @param {number[]} rows of corners
- * @param {number[]} columns
- * @returns {MeshParts} the same
+ * @param parts empty
+ * @param rows of corners
+ * @returns the same
  */
-function buildTile(parts, corner, rows, columns) {
+function buildTile(parts: MeshParts, corner: Corner, rows: number[],
+  columns: number[]): MeshParts {
   for (const [i, row] of rows.entries()) {
     for (const [k, column] of columns.entries()) {
       const last = corner(parts, row, column);
@@ -120,18 +105,16 @@ function buildTile(parts, corner, rows, columns) {
  * Compute the heights of the land under the roads: each corner is under the lowest road of the
  * cells around it, or, without one, as high as the corners around it.
  *
- * @param {Scene} scene
- * @param {number} x0
- * @param {number} y0
- * @param {number} cell [m]
- * @param {number} count of cells along an edge
- * @returns {Float64Array|null} by row and column [m]; null for a flat map
+ * @param cell [m]
+ * @param count of cells along an edge
+ * @returns by row and column [m]; null for a flat map
  */
-function landHeights(scene, x0, y0, cell, count) {
+function landHeights(scene: Scene, x0: number, y0: number, cell: number,
+  count: number): Float64Array | null {
   const width = count + 1;
   const lowest = new Float64Array(width * width).fill(Infinity);
   for (const { left, right, left_z, right_z } of scene.lanelets) {
-    for (const [line, heights] of /** @type {const} */ ([[left, left_z], [right, right_z]])) {
+    for (const [line, heights] of [[left, left_z], [right, right_z]] as const) {
       if (!heights) {
         continue;
       }
@@ -151,14 +134,7 @@ function landHeights(scene, x0, y0, cell, count) {
   return lowest.every((height) => height === Infinity) ? null : spread(lowest, width);
 }
 
-/**
- * @param {Float64Array} lowest
- * @param {number} width
- * @param {number} row
- * @param {number} column
- * @param {number} height
- */
-function lower(lowest, width, row, column, height) {
+function lower(lowest: Float64Array, width: number, row: number, column: number, height: number) {
   for (let r = Math.max(row - 1, 0); r <= Math.min(row + 2, width - 1); r += 1) {
     for (let c = Math.max(column - 1, 0); c <= Math.min(column + 2, width - 1); c += 1) {
       lowest[r * width + c] = Math.min(lowest[r * width + c], height);
@@ -169,11 +145,9 @@ function lower(lowest, width, row, column, height) {
 /**
  * Fill unknown heights from their neighbours, ring by ring.
  *
- * @param {Float64Array} heights Infinity if unknown
- * @param {number} width
- * @returns {Float64Array}
+ * @param heights Infinity if unknown
  */
-function spread(heights, width) {
+function spread(heights: Float64Array, width: number): Float64Array {
   let unknown = [...heights.keys()].filter((i) => heights[i] === Infinity);
   while (unknown.length > 0) {
     const known = heights.slice();

@@ -4,9 +4,9 @@
 
 import { randomFrom } from './random.js';
 
-/** @import { BufferGeometry, DataTexture, Material, MeshLambertMaterial } from 'three' */
-/** @import { MeshParts } from './mesh_parts.js' */
-/** @typedef {typeof import('../three.js')} Three */
+import type { BufferGeometry, DataTexture, Material, MeshLambertMaterial } from 'three';
+import type { MeshParts } from './mesh_parts.js';
+import type { Three } from '../three.js';
 
 const GRAIN_PX = 256;
 /** The edge of the grain's square on the road [m]. */
@@ -21,10 +21,9 @@ export const GRAIN_ANISOTROPY = 8;
 /**
  * Return a grain as of asphalt, whose motion conveys speed.
  *
- * @param {Three} three
- * @returns {DataTexture} grey, repeated, never darker than two thirds
+ * @returns grey, repeated, never darker than two thirds
  */
-export function grainTexture(three) {
+export function grainTexture(three: Three): DataTexture {
   const random = randomFrom('grain');
   const pixels = new Uint8Array(4 * GRAIN_PX * GRAIN_PX);
   const coarse = Array.from({ length: 64 * 64 }, random);
@@ -47,11 +46,9 @@ export function grainTexture(three) {
 /**
  * Make ranks decide which of two flat things at one height is visible.
  *
- * @template {Material} M
- * @param {M} material of meshes with an attribute `rank`
- * @returns {M}
+ * @param material of meshes with an attribute `rank`
  */
-export function ranked(material) {
+export function ranked<M extends Material>(material: M): M {
   material.onBeforeCompile = (shader) => {
     shader.vertexShader = `attribute float rank;\n${shader.vertexShader}`.replace(
       '#include <project_vertex>',
@@ -62,25 +59,14 @@ export function ranked(material) {
   return material;
 }
 
-/**
- * Return the material of everything that is coloured by its vertices.
- *
- * @param {Three} three
- * @param {DataTexture|null} map
- * @returns {MeshLambertMaterial}
- */
-export function paintedMaterial(three, map) {
+/** Return the material of everything that is coloured by its vertices. */
+export function paintedMaterial(three: Three, map: DataTexture | null): MeshLambertMaterial {
   return ranked(new three.MeshLambertMaterial({ vertexColors: true, map }));
 }
 
-/**
- * Return the geometry of parts.
- *
- * @param {Three} three
- * @param {MeshParts} parts
- * @returns {BufferGeometry}
- */
-export function geometryOf(three, { positions, normals, colors, ranks, indices }) {
+/** Return the geometry of parts. */
+export function geometryOf(three: Three,
+  { positions, normals, colors, ranks, indices }: MeshParts): BufferGeometry {
   const geometry = new three.BufferGeometry();
   const linear = new Float32Array(colors.length);
   for (let i = 0; i < colors.length; i += 1) {

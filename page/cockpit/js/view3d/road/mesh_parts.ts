@@ -2,27 +2,21 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Triangles that are drawn at once: positions, normals, colours and ranks. */
 
-/** @typedef {[red: number, green: number, blue: number]} Rgb 0 to 255, as in sRGB */
-/** @typedef {(x: number, y: number) => number} Heights the height at a point of the map [m] */
+export type Rgb = [red: number, green: number, blue: number]; // 0 to 255, as in sRGB
+export type Heights = (x: number, y: number) => number; // the height at a point of the map [m]
 
-/** @type {readonly [number, number, number]} */
-const UP = [0, 0, 1];
+const UP: readonly [number, number, number] = [0, 0, 1];
 
 /** A collection of triangles; points are passed in map coordinates and kept from the origin. */
 export class MeshParts {
-  /** @type {number[]} x, y, z from the origin [m] */
-  positions = [];
-  /** @type {number[]} */
-  normals = [];
-  /** @type {number[]} 0 to 255 */
-  colors = [];
-  /** @type {number[]} by vertex: of flat things at one height the highest rank is on top */
-  ranks = [];
-  /** @type {number[]} */
-  indices = [];
+  positions: number[] = []; // x, y, z from the origin [m]
+  normals: number[] = [];
+  colors: number[] = []; // 0 to 255
+  ranks: number[] = []; // by vertex: of flat things at one height the highest rank is on top
+  indices: number[] = [];
+  origin;
 
-  /** @param {{x: number, y: number}} origin */
-  constructor(origin) {
+  constructor(origin: { x: number; y: number }) {
     this.origin = origin;
   }
 
@@ -30,16 +24,8 @@ export class MeshParts {
     return this.indices.length / 3;
   }
 
-  /**
-   * @param {number} x
-   * @param {number} y
-   * @param {number} z
-   * @param {Rgb} color
-   * @param {number} rank
-   * @param {readonly [number, number, number]} [normal]
-   * @returns {number} index of the vertex
-   */
-  vertex(x, y, z, color, rank, normal = UP) {
+  /** @returns index of the vertex */
+  vertex(x: number, y: number, z: number, color: Rgb, rank: number, normal = UP): number {
     this.positions.push(x - this.origin.x, y - this.origin.y, z);
     this.normals.push(...normal);
     this.colors.push(...color);
@@ -50,13 +36,10 @@ export class MeshParts {
   /**
    * Add the strip between two lines with as many points each.
    *
-   * @param {number[]} left flat polyline
-   * @param {number[]} right flat polyline
-   * @param {Heights} heights
-   * @param {Rgb} color
-   * @param {number} rank
+   * @param left flat polyline
+   * @param right flat polyline
    */
-  addStrip(left, right, heights, color, rank) {
+  addStrip(left: number[], right: number[], heights: Heights, color: Rgb, rank: number) {
     for (let i = 0; i < left.length; i += 2) {
       this.vertex(left[i], left[i + 1], heights(left[i], left[i + 1]), color, rank);
       const last = this.vertex(right[i], right[i + 1], heights(right[i], right[i + 1]), color,
@@ -70,13 +53,10 @@ export class MeshParts {
   /**
    * Add a polygon that is visible from above.
    *
-   * @param {number[]} ring flat polygon
-   * @param {ArrayLike<number>} faces three indices of its points for each triangle
-   * @param {Heights} heights
-   * @param {Rgb} color
-   * @param {number} rank
+   * @param ring flat polygon
+   * @param faces three indices of its points for each triangle
    */
-  addFaces(ring, faces, heights, color, rank) {
+  addFaces(ring: number[], faces: ArrayLike<number>, heights: Heights, color: Rgb, rank: number) {
     const first = this.ranks.length;
     for (let i = 0; i < ring.length; i += 2) {
       this.vertex(ring[i], ring[i + 1], heights(ring[i], ring[i + 1]), color, rank);
@@ -94,17 +74,13 @@ export class MeshParts {
   /**
    * Add an upright band along a line: the side of a kerb, or of an embankment.
    *
-   * @param {number[]} line flat polyline; the wall is visible from its right
-   * @param {Heights} bottom
-   * @param {Heights} top
-   * @param {Rgb} color
+   * @param line flat polyline; the wall is visible from its right
    */
-  addWall(line, bottom, top, color) {
+  addWall(line: number[], bottom: Heights, top: Heights, color: Rgb) {
     for (let i = 0; i + 3 < line.length; i += 2) {
       const [x0, y0, x1, y1] = line.slice(i, i + 4);
       const length = Math.hypot(x1 - x0, y1 - y0) || 1;
-      /** @type {[number, number, number]} */
-      const normal = [(y1 - y0) / length, (x0 - x1) / length, 0];
+      const normal: [number, number, number] = [(y1 - y0) / length, (x0 - x1) / length, 0];
       const first = this.vertex(x0, y0, bottom(x0, y0), color, 0, normal);
       this.vertex(x1, y1, bottom(x1, y1), color, 0, normal);
       this.vertex(x1, y1, top(x1, y1), color, 0, normal);

@@ -4,28 +4,27 @@
 
 import { SeenInstances } from '../seen_instances.js';
 
-/** @import { BufferGeometry, Material } from 'three' */
-/** @import { Sight } from '../seen_instances.js' */
-/** @typedef {typeof import('../three.js')} Three */
+import type { BufferGeometry, Material } from 'three';
+import type { Sight } from '../seen_instances.js';
+import type { Three } from '../three.js';
 
 const CELL_M = 100;
 // How far the eye moves before the nearest are searched again [m].
 const MOVED_M = 40;
 
-/**
- * @typedef {object} Instance from the local origin
- * @property {number} x
- * @property {number} y
- * @property {number} z of its foot [m]
- * @property {number} yaw [rad]
- * @property {[number, number, number]} size scale of its unit shape
- * @property {number} color as on the screen; multiplies the shape's own
- */
+/** From the local origin. */
+export interface Instance {
+  x: number;
+  y: number;
+  z: number; // of its foot [m]
+  yaw: number; // [rad]
+  size: [number, number, number]; // scale of its unit shape
+  color: number; // as on the screen; multiplies the shape's own
+}
 
 /** Instances of one shape, drawn in one call, or in two if those far away are plainer. */
 export class NearInstances {
-  /** @type {Map<string, Instance[]>} */
-  #cells = new Map();
+  #cells = new Map<string, Instance[]>();
   #three;
   #reach;
   #most;
@@ -34,15 +33,13 @@ export class NearInstances {
   #at = { x: Infinity, y: Infinity };
 
   /**
-   * @param {Three} three
-   * @param {BufferGeometry} shape of which every instance is one
-   * @param {Material} material
-   * @param {Instance[]} instances
-   * @param {number} most number drawn at a time
-   * @param {number} reach within which they are drawn [m]
-   * @param {BufferGeometry|null} [plain] the shape of those far away; null: the same
+   * @param shape of which every instance is one
+   * @param most number drawn at a time
+   * @param reach within which they are drawn [m]
+   * @param plain the shape of those far away; null: the same
    */
-  constructor(three, shape, material, instances, most, reach, plain = null) {
+  constructor(three: Three, shape: BufferGeometry, material: Material, instances: Instance[],
+    most: number, reach: number, plain: BufferGeometry | null = null) {
     this.#three = three;
     this.#reach = reach;
     this.#most = Math.min(most, instances.length);
@@ -67,12 +64,8 @@ export class NearInstances {
     return this.#most * (index?.count ?? attributes.position.count) / 3;
   }
 
-  /**
-   * Choose the instances around the eye.
-   *
-   * @param {{x: number, y: number}} eye
-   */
-  update({ x, y }) {
+  /** Choose the instances around the eye. */
+  update({ x, y }: { x: number; y: number }) {
     if (Math.hypot(x - this.#at.x, y - this.#at.y) < MOVED_M) {
       return;
     }
@@ -91,17 +84,13 @@ export class NearInstances {
     this.#seen.seeAll();
   }
 
-  /** @param {Sight} sight of the camera that draws next */
-  see(sight) {
+  /** @param sight of the camera that draws next */
+  see(sight: Sight) {
     this.#seen.see(sight);
   }
 
-  /**
-   * @param {number} x
-   * @param {number} y
-   * @returns {Instance[]} the nearest ones
-   */
-  #near(x, y) {
+  /** @returns the nearest ones */
+  #near(x: number, y: number): Instance[] {
     const found = [];
     const cells = Math.ceil(this.#reach / CELL_M);
     const [column, row] = [Math.floor(x / CELL_M), Math.floor(y / CELL_M)];

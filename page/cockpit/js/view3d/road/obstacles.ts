@@ -6,18 +6,17 @@ import { MeshParts } from './mesh_parts.js';
 import { geometryOf } from './materials.js';
 import { addBox } from './scenery_shapes.js';
 
-/** @import { Material } from 'three' */
-/** @import { OccupancyFrame } from '../../frames.js' */
-/** @import { Origin } from '../local_origin.js' */
-/** @import { Heights, Rgb } from './mesh_parts.js' */
-/** @typedef {typeof import('../three.js')} Three */
+import type { Material } from 'three';
+import type { OccupancyFrame } from '../../frames.js';
+import type { Origin } from '../local_origin.js';
+import type { Heights, Rgb } from './mesh_parts.js';
+import type { Three } from '../three.js';
 
-/** @typedef {{row: number, rows: number, column: number, columns: number}} Block of cells */
+export interface Block { row: number; rows: number; column: number; columns: number } // of cells
 
 // Their height is unknown: that of kerbs and low fences, which do not block the view [m].
 const HEIGHT_M = 0.35;
-/** @type {Rgb} */
-const COLOR = [150, 146, 140];
+const COLOR: Rgb = [150, 146, 140];
 // More blocks than this are not drawn: such a map is noise.
 const MOST_BLOCKS = 6000;
 
@@ -26,16 +25,11 @@ export class Obstacles {
   #three;
   #origin;
   #heights;
-  /** @type {OccupancyFrame|null} */
-  #map = null;
+  #map: OccupancyFrame | null = null;
+  mesh;
 
-  /**
-   * @param {Three} three the library
-   * @param {Origin} origin
-   * @param {Heights} heights
-   * @param {Material} painted
-   */
-  constructor(three, origin, heights, painted) {
+  /** @param three the library */
+  constructor(three: Three, origin: Origin, heights: Heights, painted: Material) {
     this.#three = three;
     this.#origin = origin;
     this.#heights = heights;
@@ -43,8 +37,8 @@ export class Obstacles {
     this.mesh.visible = false;
   }
 
-  /** @param {OccupancyFrame|null} map of the store */
-  update(map) {
+  /** @param map of the store */
+  update(map: OccupancyFrame | null) {
     if (map === this.#map) {
       return;
     }
@@ -57,11 +51,7 @@ export class Obstacles {
     }
   }
 
-  /**
-   * @param {OccupancyFrame} map
-   * @param {Block[]} blocks
-   */
-  #geometry({ x, y, resolution }, blocks) {
+  #geometry({ x, y, resolution }: OccupancyFrame, blocks: Block[]) {
     const parts = new MeshParts(this.#origin);
     for (const { row, rows, column, columns } of blocks) {
       const [x0, y0] = [x + column * resolution, y + row * resolution];
@@ -81,17 +71,14 @@ export class Obstacles {
 /**
  * Join the occupied cells to blocks, along rows and across equal rows.
  *
- * @param {Pick<OccupancyFrame, 'rows'|'columns'|'bits'>} map
- * @returns {Block[]} that hold each occupied cell once, MOST_BLOCKS at most
+ * @returns that hold each occupied cell once, MOST_BLOCKS at most
  */
-export function blocksOf({ rows, columns, bits }) {
-  /** @type {Block[]} */
-  const blocks = [];
-  /** @type {Map<number, Block>} those that may go on, by their columns */
-  let open = new Map();
+export function blocksOf(
+  { rows, columns, bits }: Pick<OccupancyFrame, 'rows' | 'columns' | 'bits'>): Block[] {
+  const blocks: Block[] = [];
+  let open = new Map<number, Block>(); // those that may go on, by their columns
   for (let row = 0; row < rows && blocks.length < MOST_BLOCKS; row += 1) {
-    /** @type {Map<number, Block>} */
-    const next = new Map();
+    const next = new Map<number, Block>();
     for (let column = 0; column < columns; column += 1) {
       const start = column;
       while (column < columns && isOccupied(bits, row * columns + column)) {
@@ -113,10 +100,6 @@ export function blocksOf({ rows, columns, bits }) {
   return blocks.slice(0, MOST_BLOCKS);
 }
 
-/**
- * @param {Uint8Array} bits
- * @param {number} cell
- */
-function isOccupied(bits, cell) {
+function isOccupied(bits: Uint8Array, cell: number) {
   return (bits[cell >> 3] >> (cell & 7) & 1) === 1;
 }

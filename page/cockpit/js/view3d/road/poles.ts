@@ -2,21 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Places of the poles of signs and traffic lights: as in the map, but never on a lane. */
 
-/** @import { Lanelet, Light, Scene, Sign } from '../../messages.js' */
-/** @import { RoadIndex } from './road_index.js' */
+import type { Lanelet, Light, Scene, Sign } from '../../messages.js';
+import type { RoadIndex } from './road_index.js';
 
-/**
- * A pole with its plates or lamps, for traffic with heading `yaw`.
- *
- * @typedef {object} Pole
- * @property {number} x
- * @property {number} y
- * @property {number} yaw [rad]
- * @property {boolean} hangs above the road, if there is no room beside it
- */
+/** A pole with its plates or lamps, for traffic with heading `yaw`. */
+export interface Pole {
+  x: number;
+  y: number;
+  yaw: number; // [rad]
+  hangs: boolean; // above the road, if there is no room beside it
+}
 
-/** @typedef {Pole & {plates: {kind: string, value: string}[]}} SignPole */
-/** @typedef {Pole & {light: Light}} LightPole */
+export interface SignPole extends Pole { plates: { kind: string; value: string }[] }
+export interface LightPole extends Pole { light: Light }
 
 // Room around a pole, and how far from its place it may be put [m].
 const ROOM_M = 0.45;
@@ -26,14 +24,9 @@ const STEP_M = 0.25;
 const SAME_SIGN_M = 15;
 const LIGHTS_APART_M = 0.7;
 
-/**
- * Find a place for a pole: as in the map, else to the right of its traffic, or the left.
- *
- * @param {{x: number, y: number, yaw: number}} wanted
- * @param {RoadIndex} index
- * @returns {Pole}
- */
-export function poleAt({ x, y, yaw }, index) {
+/** Find a place for a pole: as in the map, else to the right of its traffic, or the left. */
+export function poleAt({ x, y, yaw }: { x: number; y: number; yaw: number },
+  index: RoadIndex): Pole {
   const right = { x: Math.sin(yaw), y: -Math.cos(yaw) };
   for (const side of [1, -1]) {
     for (let aside = 0; aside <= FARTHEST_M; aside += STEP_M) {
@@ -52,16 +45,14 @@ export function poleAt({ x, y, yaw }, index) {
  * A sign that the map repeats for each lanelet, as most limits, gets one plate for all lanes,
  * where it begins to apply.
  *
- * @param {Pick<Scene, 'signs'|'lanelets'>} scene the scene document
- * @param {RoadIndex} index of its lanelets
- * @returns {SignPole[]}
+ * @param scene the scene document
+ * @param index of its lanelets
  */
-export function placeSigns({ signs, lanelets }, index) {
+export function placeSigns({ signs, lanelets }: Pick<Scene, 'signs' | 'lanelets'>,
+  index: RoadIndex): SignPole[] {
   const told = new ToldBefore(signs, lanelets);
-  /** @type {Map<number, SignPole>} */
-  const poles = new Map();
-  /** @type {SignPole[]} */
-  const placed = [];
+  const poles = new Map<number, SignPole>();
+  const placed: SignPole[] = [];
   for (const sign of signs) {
     const plate = { kind: sign.kind, value: sign.value };
     const pole = poles.get(sign.id);
@@ -81,13 +72,11 @@ export function placeSigns({ signs, lanelets }, index) {
 /**
  * Place the traffic lights of a scene; those at one place stand side by side.
  *
- * @param {Pick<Scene, 'lights'>} scene the scene document
- * @param {RoadIndex} index of its lanelets
- * @returns {LightPole[]}
+ * @param scene the scene document
+ * @param index of its lanelets
  */
-export function placeLights({ lights }, index) {
-  /** @type {LightPole[]} */
-  const placed = [];
+export function placeLights({ lights }: Pick<Scene, 'lights'>, index: RoadIndex): LightPole[] {
+  const placed: LightPole[] = [];
   for (const light of lights) {
     const pole = { ...poleAt(light, index), light };
     while (placed.some(({ x, y }) => Math.hypot(x - pole.x, y - pole.y) < LIGHTS_APART_M - 0.01)) {
@@ -101,18 +90,11 @@ export function placeLights({ lights }, index) {
 
 /** A record of signs, to find those that repeat a sign before or beside them. */
 class ToldBefore {
-  /** @type {Map<number, Set<string>>} what the signs of a lanelet say */
-  #said = new Map();
-  /** @type {Map<number, Lanelet>} */
-  #lanelets;
-  /** @type {Map<number, number[]>} */
-  #predecessors = new Map();
+  #said = new Map<number, Set<string>>(); // what the signs of a lanelet say
+  #lanelets: Map<number, Lanelet>;
+  #predecessors = new Map<number, number[]>();
 
-  /**
-   * @param {Sign[]} signs
-   * @param {Lanelet[]} lanelets
-   */
-  constructor(signs, lanelets) {
+  constructor(signs: Sign[], lanelets: Lanelet[]) {
     this.#lanelets = new Map(lanelets.map((lanelet) => [lanelet.id, lanelet]));
     for (const sign of signs) {
       for (const id of sign.lanelets) {
@@ -126,12 +108,9 @@ class ToldBefore {
     }
   }
 
-  /**
-   * @param {Sign} sign
-   * @returns {boolean} whether all of its lanelets have it already
-   */
-  has(sign) {
-    const says = (/** @type {number} */ id) => this.#said.get(id)?.has(wordsOf(sign)) ?? false;
+  /** @returns whether all of its lanelets have it already */
+  has(sign: Sign): boolean {
+    const says = (id: number) => this.#said.get(id)?.has(wordsOf(sign)) ?? false;
     return sign.lanelets.length > 0 && sign.lanelets.every((id) => {
       const before = this.#predecessors.get(id) ?? [];
       const lanelet = this.#lanelets.get(id);
@@ -142,16 +121,11 @@ class ToldBefore {
   }
 }
 
-/** @param {{kind: string, value: string}} sign */
-function wordsOf({ kind, value }) {
+function wordsOf({ kind, value }: { kind: string; value: string }) {
   return `${kind} ${value}`;
 }
 
-/**
- * @param {SignPole} one
- * @param {SignPole} other
- */
-function isSame(one, other) {
+function isSame(one: SignPole, other: SignPole) {
   return Math.hypot(one.x - other.x, one.y - other.y) < SAME_SIGN_M
     && Math.cos(one.yaw - other.yaw) > 0.8
     && wordsOf(one.plates[0]) === wordsOf(other.plates[0]);

@@ -5,10 +5,10 @@
 /**
  * Start a sequence.
  *
- * @param {string} seed any text
- * @returns {() => number} returns the next number, from 0 to below 1
+ * @param seed any text
+ * @returns returns the next number, from 0 to below 1
  */
-export function randomFrom(seed) {
+export function randomFrom(seed: string): () => number {
   // FNV-1a for the text, mulberry32 (T. Ettinger) for the sequence.
   let state = 0x811c9dc5;
   for (let i = 0; i < seed.length; i += 1) {

@@ -7,10 +7,10 @@ import { boxOf, outlineOf } from '../../outline.js';
 import { MeshParts } from './mesh_parts.js';
 import { COLOR, pavementOf, RANK, reversed, RoadPaint } from './road_paint.js';
 
-/** @import { Box, Lanelet, Scene } from '../../messages.js' */
-/** @import { Origin } from '../local_origin.js' */
-/** @import { Heights } from './mesh_parts.js' */
-/** @import { RoadIndex } from './road_index.js' */
+import type { Box, Lanelet, Scene } from '../../messages.js';
+import type { Origin } from '../local_origin.js';
+import type { Heights } from './mesh_parts.js';
+import type { RoadIndex } from './road_index.js';
 
 const LEAST_CELL_M = 150;
 const MOST_CELL_M = 450;
@@ -18,26 +18,21 @@ const MOST_CELL_M = 450;
 const CELLS = 5;
 const BANK_M = 2;
 
-/** @typedef {(ring: number[]) => ArrayLike<number>} Triangulate flat polygon to index triples */
+export type Triangulate = (ring: number[]) => ArrayLike<number>; // flat polygon to index triples
 
 /**
  * Build the parts of a scene's roads.
  *
- * @param {Scene} scene the scene document
- * @param {Origin} origin
- * @param {RoadIndex} index of its lanelets
- * @param {Heights} heights
- * @param {Triangulate} triangulate
- * @returns {MeshParts[]}
+ * @param scene the scene document
+ * @param index of its lanelets
  */
-export function buildRoads(scene, origin, index, heights, triangulate) {
+export function buildRoads(scene: Scene, origin: Origin, index: RoadIndex, heights: Heights,
+  triangulate: Triangulate): MeshParts[] {
   const [xmin, ymin, xmax, ymax] = scene.bounds;
   const cell = Math.min(Math.max((Math.max(xmax - xmin, ymax - ymin)) / CELLS, LEAST_CELL_M),
     MOST_CELL_M);
-  /** @type {Map<string, MeshParts>} */
-  const chunks = new Map();
-  /** @type {(box: Box) => MeshParts} */
-  const chunkOf = ([x0, y0, x1, y1]) => {
+  const chunks = new Map<string, MeshParts>();
+  const chunkOf = ([x0, y0, x1, y1]: Box): MeshParts => {
     const key = `${Math.floor((x0 + x1) / 2 / cell)} ${Math.floor((y0 + y1) / 2 / cell)}`;
     const chunk = chunks.get(key) ?? new MeshParts(origin);
     chunks.set(key, chunk);
@@ -57,7 +52,7 @@ export function buildRoads(scene, origin, index, heights, triangulate) {
   }
   for (const boundary of collectBoundaries(scene.lanelets)) {
     const lanelet = scene.lanelets[boundary.owner];
-    const parts = /** @type {MeshParts} */ (homes.get(lanelet.id));
+    const parts = homes.get(lanelet.id) as MeshParts;
     paint.addBoundary(parts, boundary, lanelet);
     if (index.hasHeights && !boundary.inner) {
       addBank(parts, boundary.line, boundary.line === lanelet.left, heights);
@@ -69,13 +64,8 @@ export function buildRoads(scene, origin, index, heights, triangulate) {
   return [...chunks.values()].filter(({ triangles }) => triangles > 0);
 }
 
-/**
- * @param {MeshParts} parts
- * @param {Lanelet} lanelet
- * @param {Heights} heights
- * @param {Triangulate} triangulate
- */
-function addPavement(parts, lanelet, heights, triangulate) {
+function addPavement(parts: MeshParts, lanelet: Lanelet, heights: Heights,
+  triangulate: Triangulate) {
   const [color, rank] = pavementOf(lanelet);
   const ring = outlineOf(lanelet);
   parts.addFaces(ring, lanelet.left_z && lanelet.right_z ? ladder(lanelet) : triangulate(ring),
@@ -85,12 +75,9 @@ function addPavement(parts, lanelet, heights, triangulate) {
 /**
  * Close the gap between a road and the land, which lies lower.
  *
- * @param {MeshParts} parts
- * @param {number[]} line bound of a lanelet
- * @param {boolean} isLeft
- * @param {Heights} heights
+ * @param line bound of a lanelet
  */
-function addBank(parts, line, isLeft, heights) {
+function addBank(parts: MeshParts, line: number[], isLeft: boolean, heights: Heights) {
   // Visible from outside, facing away from the road.
   const seen = isLeft ? reversed(line) : line;
   parts.addWall(seen, (x, y) => heights(x, y) - BANK_M, heights, COLOR.bank);
@@ -99,10 +86,9 @@ function addBank(parts, line, isLeft, heights) {
 /**
  * Triangulate a lanelet from bound to bound, between points abreast, as its heights require.
  *
- * @param {Pick<Lanelet, 'left'|'right'>} lanelet
- * @returns {number[]} indices into its outline, which returns along the right bound
+ * @returns indices into its outline, which returns along the right bound
  */
-export function ladder({ left, right }) {
+export function ladder({ left, right }: Pick<Lanelet, 'left' | 'right'>): number[] {
   const [there, back] = [sharesOf(left), sharesOf(right)];
   const last = there.length + back.length - 1;
   const faces = [];
@@ -120,10 +106,10 @@ export function ladder({ left, right }) {
 }
 
 /**
- * @param {number[]} line flat polyline
- * @returns {number[]} of each point the share of the length up to it
+ * @param line flat polyline
+ * @returns of each point the share of the length up to it
  */
-function sharesOf(line) {
+function sharesOf(line: number[]): number[] {
   const lengths = [0];
   for (let i = 2; i < line.length; i += 2) {
     lengths.push(lengths[lengths.length - 1]

@@ -4,7 +4,7 @@
 
 import { boxOf, contains, outlineOf } from '../../outline.js';
 
-/** @import { Box, Lanelet } from '../../messages.js' */
+import type { Box, Lanelet } from '../../messages.js';
 
 const CELL_M = 25;
 // Tolerance, because a bound's own points are on the road, too [m].
@@ -12,16 +12,15 @@ const ON_M = 0.05;
 // How far beside a road its height applies [m].
 const BESIDE_M = 60;
 
-/** @typedef {{lanelet: Lanelet, ring: number[], box: Box}} Place */
+export interface Place { lanelet: Lanelet; ring: number[]; box: Box }
 
 /** An index of lanelets by place. */
 export class RoadIndex {
-  /** @type {Map<number, Map<number, Place[]>>} */
-  #rows = new Map();
+  #rows = new Map<number, Map<number, Place[]>>();
+  /** Whether the map has heights; else it is flat. */
+  hasHeights;
 
-  /** @param {Lanelet[]} lanelets */
-  constructor(lanelets) {
-    /** Whether the map has heights; else it is flat. */
+  constructor(lanelets: Lanelet[]) {
     this.hasHeights = lanelets.some(({ left_z }) => Boolean(left_z));
     for (const lanelet of lanelets) {
       const ring = outlineOf(lanelet);
@@ -37,14 +36,10 @@ export class RoadIndex {
   /**
    * Return the lanelets whose box is within a distance of a point.
    *
-   * @param {number} x
-   * @param {number} y
-   * @param {number} reach [m]
-   * @returns {Set<Place>}
+   * @param reach [m]
    */
-  near(x, y, reach) {
-    /** @type {Set<Place>} */
-    const found = new Set();
+  near(x: number, y: number, reach: number): Set<Place> {
+    const found = new Set<Place>();
     this.#eachCell([x - reach, y - reach, x + reach, y + reach], (column, row) => {
       for (const place of this.#rows.get(row)?.get(column) ?? []) {
         const [xmin, ymin, xmax, ymax] = place.box;
@@ -59,11 +54,11 @@ export class RoadIndex {
   /**
    * Return whether a circle touches no lanelet.
    *
-   * @param {number} x of its centre
-   * @param {number} y of its centre
-   * @param {number} radius [m]
+   * @param x of its centre
+   * @param y of its centre
+   * @param radius [m]
    */
-  isClear(x, y, radius) {
+  isClear(x: number, y: number, radius: number) {
     for (const { ring } of this.near(x, y, radius)) {
       if (contains(ring, x, y) || distanceToRing(ring, x, y) < radius) {
         return false;
@@ -75,12 +70,9 @@ export class RoadIndex {
   /**
    * Return whether a point lies well within a lanelet that is neither this one nor beside it.
    *
-   * @param {number} x
-   * @param {number} y
-   * @param {Lanelet} own
-   * @param {number} depth least distance to the other's outline [m]
+   * @param depth least distance to the other's outline [m]
    */
-  isWithinAnother(x, y, own, depth) {
+  isWithinAnother(x: number, y: number, own: Lanelet, depth: number) {
     for (const { lanelet: { id }, ring } of this.near(x, y, 0)) {
       if (id !== own.id && id !== own.adj_left && id !== own.adj_right
           && contains(ring, x, y) && distanceToRing(ring, x, y) > depth) {
@@ -93,11 +85,9 @@ export class RoadIndex {
   /**
    * Return the height of the road: of the highest bridge at a crossing, beside it of the nearest.
    *
-   * @param {number} x
-   * @param {number} y
-   * @returns {number} [m], 0 on a flat map, and far from every road
+   * @returns [m], 0 on a flat map, and far from every road
    */
-  heightAt(x, y) {
+  heightAt(x: number, y: number): number {
     if (!this.hasHeights) {
       return 0;
     }
@@ -110,11 +100,7 @@ export class RoadIndex {
     return highest === -Infinity ? this.#heightBeside(x, y) : highest;
   }
 
-  /**
-   * @param {number} x
-   * @param {number} y
-   */
-  #heightBeside(x, y) {
+  #heightBeside(x: number, y: number) {
     let least = Infinity;
     let height = 0;
     for (const { lanelet, ring } of this.near(x, y, BESIDE_M)) {
@@ -127,11 +113,7 @@ export class RoadIndex {
     return height;
   }
 
-  /**
-   * @param {Box} box
-   * @param {(column: number, row: number) => void} visit
-   */
-  #eachCell([xmin, ymin, xmax, ymax], visit) {
+  #eachCell([xmin, ymin, xmax, ymax]: Box, visit: (column: number, row: number) => void) {
     for (let row = Math.floor(ymin / CELL_M); row <= Math.floor(ymax / CELL_M); row += 1) {
       for (let column = Math.floor(xmin / CELL_M); column <= Math.floor(xmax / CELL_M);
         column += 1) {
@@ -144,12 +126,9 @@ export class RoadIndex {
 /**
  * Return a lanelet's height at a point, interpolated between both bounds.
  *
- * @param {Lanelet} lanelet
- * @param {number} x
- * @param {number} y
- * @returns {number} [m]
+ * @returns [m]
  */
-export function heightOn({ left, right, left_z, right_z }, x, y) {
+export function heightOn({ left, right, left_z, right_z }: Lanelet, x: number, y: number): number {
   if (!left_z || !right_z) {
     return 0;
   }
@@ -159,14 +138,9 @@ export function heightOn({ left, right, left_z, right_z }, x, y) {
   return width === 0 ? left_height : (left_height * to_right + right_height * to_left) / width;
 }
 
-/**
- * @param {number[]} line
- * @param {number[]} heights
- * @param {number} x
- * @param {number} y
- * @returns {[distance: number, height: number]} of its nearest point
- */
-function beside(line, heights, x, y) {
+/** @returns of its nearest point */
+function beside(line: number[], heights: number[], x: number,
+  y: number): [distance: number, height: number] {
   let least = Infinity;
   let height = 0;
   for (let i = 0; i + 3 < line.length; i += 2) {
@@ -179,12 +153,8 @@ function beside(line, heights, x, y) {
   return [least, height];
 }
 
-/**
- * @param {number[]} ring flat polygon
- * @param {number} x
- * @param {number} y
- */
-function distanceToRing(ring, x, y) {
+/** @param ring flat polygon */
+function distanceToRing(ring: number[], x: number, y: number) {
   let least = Infinity;
   for (let i = 0, j = ring.length - 2; i < ring.length; j = i, i += 2) {
     least = Math.min(least, toSegment(ring, j, i, x, y)[0]);
@@ -193,14 +163,13 @@ function distanceToRing(ring, x, y) {
 }
 
 /**
- * @param {number[]} line flat
- * @param {number} i where the segment's start is in it
- * @param {number} j where its end is
- * @param {number} x
- * @param {number} y
- * @returns {[distance: number, share: number]} of the nearest point, from its start
+ * @param line flat
+ * @param i where the segment's start is in it
+ * @param j where its end is
+ * @returns of the nearest point, from its start
  */
-function toSegment(line, i, j, x, y) {
+function toSegment(line: number[], i: number, j: number, x: number,
+  y: number): [distance: number, share: number] {
   const dx = line[j] - line[i];
   const dy = line[j + 1] - line[i + 1];
   const square = dx * dx + dy * dy;

@@ -7,20 +7,17 @@ import { strokesOf } from '../../world/marking_strokes.js';
 import { shifted } from '../../world/polyline.js';
 import { paintedPieces, stripOf } from './strips.js';
 
-/** @import { Lanelet, Scene } from '../../messages.js' */
-/** @import { Boundary } from '../../world/boundaries.js' */
-/** @import { Stroke } from '../../world/marking_strokes.js' */
-/** @import { Heights, MeshParts, Rgb } from './mesh_parts.js' */
-/** @import { RoadIndex } from './road_index.js' */
+import type { Lanelet, Scene } from '../../messages.js';
+import type { Boundary } from '../../world/boundaries.js';
+import type { Stroke } from '../../world/marking_strokes.js';
+import type { Heights, MeshParts, Rgb } from './mesh_parts.js';
+import type { RoadIndex } from './road_index.js';
 
 /** Ranks of flat things: the higher one is on top. */
 export const RANK = { road: 1, special: 2, seam: 3, line: 4, across: 5 };
 
-/**
- * @type {Record<'road'|'walk'|'cycle'|'parking'|'bus'|'kerb'|'seam'|'white'|'yellow'|'worn'
- *   |'bank', Rgb>}
- */
-export const COLOR = {
+export const COLOR: Record<'road' | 'walk' | 'cycle' | 'parking' | 'bus' | 'kerb' | 'seam'
+  | 'white' | 'yellow' | 'worn' | 'bank', Rgb> = {
   road: [98, 100, 103], walk: [172, 167, 157], cycle: [139, 84, 72], parking: [112, 111, 110],
   bus: [108, 93, 82], kerb: [178, 176, 170], seam: [66, 67, 70], white: [240, 240, 236],
   yellow: [232, 186, 60], worn: [158, 159, 158], bank: [96, 104, 70],
@@ -28,21 +25,16 @@ export const COLOR = {
 const KERB_M = { curb: 0.12, lowered: 0.03 };
 const STOP_LINE_M = 0.5;
 const WAIT_LINE_M = 0.3;
-/** @type {[number, number]} */
-const WAIT_DASH = [0.5, 0.25];
+const WAIT_DASH: [number, number] = [0.5, 0.25];
 // Countries with a yellow centre line.
 const YELLOW_CENTRES = ['USA', 'PRI', 'CAN', 'MEX', 'BRA', 'ARG', 'CHN'];
 // A kerb, or an edge of unknown marking, ends where another lanelet begins.
 const STEP_M = 1.5;
 const WITHIN_M = 0.3;
 
-/**
- * Return the pavement of a lanelet and its rank.
- *
- * @param {Pick<Lanelet, 'types'|'intersection'>} lanelet
- * @returns {[color: Rgb, rank: number]}
- */
-export function pavementOf(lanelet) {
+/** Return the pavement of a lanelet and its rank. */
+export function pavementOf(
+  lanelet: Pick<Lanelet, 'types' | 'intersection'>): [color: Rgb, rank: number] {
   if (lanelet.types.includes('busLane')) {
     return [COLOR.bus, RANK.special];
   }
@@ -60,12 +52,8 @@ export class RoadPaint {
   #heights;
   #yellow;
 
-  /**
-   * @param {Pick<Scene, 'country'>} scene
-   * @param {RoadIndex} index of its lanelets
-   * @param {Heights} heights
-   */
-  constructor({ country }, index, heights) {
+  /** @param index of its lanelets */
+  constructor({ country }: Pick<Scene, 'country'>, index: RoadIndex, heights: Heights) {
     this.#index = index;
     this.#heights = heights;
     this.#yellow = YELLOW_CENTRES.includes(country);
@@ -74,11 +62,9 @@ export class RoadPaint {
   /**
    * Add the paint or kerb along a boundary.
    *
-   * @param {MeshParts} parts
-   * @param {Boundary} boundary
-   * @param {Lanelet} lanelet whose boundary it is
+   * @param lanelet whose boundary it is
    */
-  addBoundary(parts, boundary, lanelet) {
+  addBoundary(parts: MeshParts, boundary: Boundary, lanelet: Lanelet) {
     for (const stroke of strokesOf(boundary, lanelet)) {
       const line = shifted(boundary.line, stroke.offset);
       if (stroke.kind === 'curb' || stroke.kind === 'lowered') {
@@ -96,32 +82,20 @@ export class RoadPaint {
     }
   }
 
-  /**
-   * @param {MeshParts} parts
-   * @param {Lanelet} lanelet a crossing
-   */
-  addZebra(parts, lanelet) {
+  /** @param lanelet a crossing */
+  addZebra(parts: MeshParts, lanelet: Lanelet) {
     for (const stripe of zebraStripes(lanelet)) {
       parts.addFaces(stripe, [0, 2, 1, 0, 3, 2], this.#heights, COLOR.white, RANK.across);
     }
   }
 
-  /**
-   * @param {MeshParts} parts
-   * @param {{points: number[], line: string}} stop
-   */
-  addStopLine(parts, { points, line }) {
+  addStopLine(parts: MeshParts, { points, line }: { points: number[]; line: string }) {
     const dashed = line.includes('dashed');
     this.#addStrips(parts, paintedPieces(points, dashed ? WAIT_DASH : null),
       dashed ? WAIT_LINE_M : STOP_LINE_M, COLOR.white, RANK.across);
   }
 
-  /**
-   * @param {MeshParts} parts
-   * @param {Boundary} boundary
-   * @param {Lanelet} lanelet
-   */
-  #addWorn(parts, boundary, lanelet) {
+  #addWorn(parts: MeshParts, boundary: Boundary, lanelet: Lanelet) {
     const known = { ...boundary, marking: boundary.inner ? 'dashed' : 'solid' };
     for (const { width, dash } of strokesOf(known, lanelet)) {
       for (const piece of this.#freePieces(boundary.line, lanelet)) {
@@ -130,16 +104,8 @@ export class RoadPaint {
     }
   }
 
-  /**
-   * @param {MeshParts} parts
-   * @param {number[]} line
-   * @param {Stroke} stroke
-   * @param {number} height
-   * @param {Lanelet} lanelet
-   */
-  #addKerb(parts, line, { width }, height, lanelet) {
-    /** @type {Heights} */
-    const top = (x, y) => this.#heights(x, y) + height;
+  #addKerb(parts: MeshParts, line: number[], { width }: Stroke, height: number, lanelet: Lanelet) {
+    const top: Heights = (x, y) => this.#heights(x, y) + height;
     for (const piece of this.#freePieces(line, lanelet)) {
       const [left, right] = stripOf(piece, width);
       parts.addStrip(left, right, top, COLOR.kerb, 0);
@@ -148,32 +114,17 @@ export class RoadPaint {
     }
   }
 
-  /**
-   * @param {MeshParts} parts
-   * @param {number[][]} pieces
-   * @param {number} width
-   * @param {Rgb} color
-   * @param {number} rank
-   */
-  #addStrips(parts, pieces, width, color, rank) {
+  #addStrips(parts: MeshParts, pieces: number[][], width: number, color: Rgb, rank: number) {
     for (const piece of pieces) {
       const [left, right] = stripOf(piece, width);
       parts.addStrip(left, right, this.#heights, color, rank);
     }
   }
 
-  /**
-   * Return the pieces of a line that do not lead through other lanelets.
-   *
-   * @param {number[]} line
-   * @param {Lanelet} lanelet
-   * @returns {number[][]}
-   */
-  #freePieces(line, lanelet) {
-    /** @type {number[][]} */
-    const pieces = [];
-    /** @type {number[]} */
-    let piece = [];
+  /** Return the pieces of a line that do not lead through other lanelets. */
+  #freePieces(line: number[], lanelet: Lanelet): number[][] {
+    const pieces: number[][] = [];
+    let piece: number[] = [];
     const dense = densified(line, STEP_M);
     for (let i = 0; i < dense.length; i += 2) {
       if (this.#index.isWithinAnother(dense[i], dense[i + 1], lanelet, WITHIN_M)) {
@@ -187,23 +138,18 @@ export class RoadPaint {
   }
 }
 
-/**
- * Return whether a boundary separates two directions.
- *
- * @param {Boundary} boundary
- * @param {Lanelet} lanelet
- */
-function isCentre({ line }, lanelet) {
+/** Return whether a boundary separates two directions. */
+function isCentre({ line }: Boundary, lanelet: Lanelet) {
   return line === lanelet.left ? lanelet.adj_left !== null && !lanelet.adj_left_same
     : lanelet.adj_right !== null && !lanelet.adj_right_same;
 }
 
 /**
- * @param {number[]} line flat polyline
- * @param {number} step longest part of the result [m]
- * @returns {number[]} the same line, with points between its own
+ * @param line flat polyline
+ * @param step longest part of the result [m]
+ * @returns the same line, with points between its own
  */
-export function densified(line, step) {
+export function densified(line: number[], step: number): number[] {
   const dense = line.slice(0, 2);
   for (let i = 2; i < line.length; i += 2) {
     const [x, y] = [line[i - 2], line[i - 1]];
@@ -218,10 +164,9 @@ export function densified(line, step) {
 /**
  * Return a line without the points that lie straight between their neighbours.
  *
- * @param {number[]} line flat polyline
- * @returns {number[]}
+ * @param line flat polyline
  */
-function straightened(line) {
+function straightened(line: number[]): number[] {
   const kept = line.slice(0, 2);
   for (let i = 2; i + 3 < line.length; i += 2) {
     const ax = line[i] - kept[kept.length - 2];
@@ -237,10 +182,10 @@ function straightened(line) {
 }
 
 /**
- * @param {number[]} line flat polyline
- * @returns {number[]} in reverse order
+ * @param line flat polyline
+ * @returns in reverse order
  */
-export function reversed(line) {
+export function reversed(line: number[]): number[] {
   const back = [];
   for (let i = line.length - 2; i >= 0; i -= 2) {
     back.push(line[i], line[i + 1]);

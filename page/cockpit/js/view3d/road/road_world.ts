@@ -15,49 +15,46 @@ import { Scenery } from './scenery.js';
 import { Signs } from './signs.js';
 import { TrafficLights } from './traffic_lights.js';
 
-/** @import { FogExp2, Group, Mesh, Object3D } from 'three' */
-/** @import { MeshParts } from './mesh_parts.js' */
-/** @import { Environment, Scene } from '../../messages.js' */
-/** @import { Store } from '../../store.js' */
-/** @import { Sight } from '../seen_instances.js' */
+import type { FogExp2, Group, Mesh, Object3D } from 'three';
+import type { MeshParts } from './mesh_parts.js';
+import type { Environment, Scene } from '../../messages.js';
+import type { Store } from '../../store.js';
+import type { Sight } from '../seen_instances.js';
+import type { Three } from '../three.js';
 
 const LAND_ORDER = 900;
 
-/** @typedef {typeof import('../three.js')} Three the library three.js */
-/** @typedef {{x: number, y: number, z: number}} Point from the local origin [m] */
+export interface Point { x: number; y: number; z: number } // from the local origin [m]
 
-/**
- * @typedef {object} RoadWorld
- * @property {Group} group for the scene of three.js: z up, metres from `localOrigin(scene)`;
- *   includes the lights
- * @property {FogExp2} fog of the scene of three.js
- * @property {(environment: Environment) => void} setEnvironment shows another time of day or
- *   visibility than the scene document's
- * @property {(store: Store, now_ms: number, eye: Point) => void} update called before each
- *   picture, after `store.displayed(now_ms)`; eye is that of the main camera
- * @property {(sight: Sight) => void} see called before each camera draws, after `update`; else
- *   everything near is drawn
- * @property {(x: number, y: number) => number} heightAt of the road at a point of the map [m]
- * @property {(fine: boolean) => void} setFine see Detail
- * @property {number} triangles in the whole group, at most
- * @property {number} drawCalls at most, if all of it is visible
- * @property {number} build_ms build time
- * @property {() => void} dispose frees the memory of the graphics card
- */
+export interface RoadWorld {
+  // for the scene of three.js: z up, metres from `localOrigin(scene)`; includes the lights
+  group: Group;
+  fog: FogExp2; // of the scene of three.js
+  // shows another time of day or visibility than the scene document's
+  setEnvironment: (environment: Environment) => void;
+  // called before each picture, after `store.displayed(now_ms)`; eye is that of the main camera
+  update: (store: Store, now_ms: number, eye: Point) => void;
+  // called before each camera draws, after `update`; else everything near is drawn
+  see: (sight: Sight) => void;
+  heightAt: (x: number, y: number) => number; // of the road at a point of the map [m]
+  setFine: (fine: boolean) => void; // see Detail
+  triangles: number; // in the whole group, at most
+  drawCalls: number; // at most, if all of it is visible
+  build_ms: number; // build time
+  dispose: () => void; // frees the memory of the graphics card
+}
 
 /**
  * Build the world of a scene.
  *
- * @param {Three} three the library
- * @param {Scene} scene the scene document
- * @returns {RoadWorld}
+ * @param three the library
+ * @param scene the scene document
  */
-export function createRoadWorld(three, scene) {
+export function createRoadWorld(three: Three, scene: Scene): RoadWorld {
   const begin_ms = performance.now();
   const origin = localOrigin(scene);
   const index = new RoadIndex(scene.lanelets);
-  /** @type {(x: number, y: number) => number} */
-  const heightAt = (x, y) => index.heightAt(x, y);
+  const heightAt = (x: number, y: number): number => index.heightAt(x, y);
   const group = new three.Group();
   const atmosphere = new Atmosphere(three);
   atmosphere.set(scene.environment);
@@ -65,8 +62,7 @@ export function createRoadWorld(three, scene) {
   const material = paintedMaterial(three, grain);
   const roads = buildRoads(scene, origin, index, heightAt, triangulator(three));
   const land = buildLand(scene, origin);
-  /** @type {(parts: MeshParts) => Mesh} */
-  const meshOf = (parts) => {
+  const meshOf = (parts: MeshParts): Mesh => {
     const mesh = new three.Mesh(geometryOf(three, parts), material);
     mesh.matrixAutoUpdate = false;
     return mesh;
@@ -85,9 +81,8 @@ export function createRoadWorld(three, scene) {
   const lights = new TrafficLights(three, placeLights(scene, index), origin, heightAt, painted);
   const obstacles = new Obstacles(three, origin, heightAt, painted);
   const standing = [scenery, signs, lights];
-  /** @type {Object3D[]} */
-  const all = [...meshes, ...plainTiles, ...scenery.meshes, ...signs.meshes, ...lights.meshes,
-    obstacles.mesh];
+  const all: Object3D[] = [...meshes, ...plainTiles, ...scenery.meshes, ...signs.meshes,
+    ...lights.meshes, obstacles.mesh];
   group.add(atmosphere.group, ...all);
   return {
     group, fog: atmosphere.fog, heightAt,
@@ -127,11 +122,8 @@ export function createRoadWorld(three, scene) {
   };
 }
 
-/**
- * @param {Three} three
- * @returns {(ring: number[]) => number[]} returns three indices for each triangle of a polygon
- */
-function triangulator(three) {
+/** @returns returns three indices for each triangle of a polygon */
+function triangulator(three: Three): (ring: number[]) => number[] {
   return (ring) => {
     const corners = [];
     for (let i = 0; i < ring.length; i += 2) {

@@ -15,23 +15,22 @@ import { surfaceOf } from '../../world/map_geometry.js';
 import { randomFrom } from './random.js';
 import { densified } from './road_paint.js';
 
-/** @import { Box, Lanelet, Scene } from '../../messages.js' */
-/** @import { RoadClass } from '../../world/marking_strokes.js' */
-/** @import { RoadIndex } from './road_index.js' */
+import type { Box, Lanelet, Scene } from '../../messages.js';
+import type { RoadClass } from '../../world/marking_strokes.js';
+import type { RoadIndex } from './road_index.js';
 
-/**
- * An object in the land: its middle in map coordinates, its direction and its size.
- *
- * @typedef {object} Stand
- * @property {number} x
- * @property {number} y
- * @property {number} yaw away from the road, of posts and lamps along it [rad]
- * @property {[length: number, width: number, height: number]} size [m]
- * @property {number} shade 0 to 1, variation of the colour
- */
+/** An object in the land: its middle in map coordinates, its direction and its size. */
+export interface Stand {
+  x: number;
+  y: number;
+  yaw: number; // away from the road, of posts and lamps along it [rad]
+  size: [length: number, width: number, height: number]; // [m]
+  shade: number; // 0 to 1, variation of the colour
+}
 
-/** @typedef {Record<'posts'|'lamps'|'trees'|'firs'|'houses', Stand[]>} Roadside */
-/** @typedef {{x: number, y: number, yaw: number}} EdgePose of a road; yaw leads away from it */
+export type Roadside = Record<'posts' | 'lamps' | 'trees' | 'firs' | 'houses', Stand[]>;
+/** Of a road; yaw leads away from it. */
+export interface EdgePose { x: number; y: number; yaw: number }
 
 const POST_EVERY_M = 50;
 const POST_BESIDE_M = 0.5;
@@ -49,11 +48,9 @@ const TREE_SHARE = { motorway: 0.75, country: 0.65, town: 0.3 };
 
 /** Points of the roads, to find those around a place. */
 class RoadPoints {
-  /** @type {Map<string, number[]>} */
-  #cells = new Map();
+  #cells = new Map<string, number[]>();
 
-  /** @param {Lanelet[]} lanelets */
-  constructor(lanelets) {
+  constructor(lanelets: Lanelet[]) {
     for (const { left, right } of lanelets) {
       for (const line of [left, right]) {
         const dense = densified(line, 6);
@@ -70,11 +67,10 @@ class RoadPoints {
   /**
    * Return whether every road around is on the near side of a line.
    *
-   * @param {number} x of a point of the line
-   * @param {number} y
-   * @param {number} yaw normal of the line, to its far side [rad]
+   * @param x of a point of the line
+   * @param yaw normal of the line, to its far side [rad]
    */
-  areBefore(x, y, yaw) {
+  areBefore(x: number, y: number, yaw: number) {
     const cos = Math.cos(yaw);
     const sin = Math.sin(yaw);
     const cells = Math.ceil(SIGHT_M / SIGHT_CELL_M);
@@ -96,18 +92,15 @@ class RoadPoints {
 
 /** A record of occupied circles. */
 class Taken {
-  /** @type {Map<string, {x: number, y: number, radius: number}[]>} */
-  #cells = new Map();
+  #cells = new Map<string, { x: number; y: number; radius: number }[]>();
 
   /**
    * Occupy a circle, unless another one touches it.
    *
-   * @param {number} x
-   * @param {number} y
-   * @param {number} radius at most half a cell [m]
-   * @returns {boolean} whether it was free
+   * @param radius at most half a cell [m]
+   * @returns whether it was free
    */
-  claim(x, y, radius) {
+  claim(x: number, y: number, radius: number): boolean {
     for (let column = -1; column <= 1; column += 1) {
       for (let row = -1; row <= 1; row += 1) {
         const cell = this.#cells.get(
@@ -126,17 +119,16 @@ class Taken {
 /**
  * Place all objects, always alike for the same scene.
  *
- * @param {Pick<Scene, 'id'|'bounds'|'lanelets'>} scene the scene document
- * @param {RoadIndex} index of its lanelets
- * @returns {Roadside}
+ * @param scene the scene document
+ * @param index of its lanelets
  */
-export function placeRoadside({ id, bounds, lanelets }, index) {
+export function placeRoadside({ id, bounds, lanelets }: Pick<Scene, 'id' | 'bounds' | 'lanelets'>,
+  index: RoadIndex): Roadside {
   const random = randomFrom(id);
   const points = new RoadPoints(lanelets);
   const taken = new Taken();
   const stations = stationsOf(lanelets);
-  /** @type {Roadside} */
-  const roadside = { posts: [], lamps: [], trees: [], firs: [], houses: [] };
+  const roadside: Roadside = { posts: [], lamps: [], trees: [], firs: [], houses: [] };
   for (const { line, owner, inner } of collectBoundaries(lanelets)) {
     const lanelet = lanelets[owner];
     const surface = surfaceOf(lanelet);
@@ -161,32 +153,34 @@ export function placeRoadside({ id, bounds, lanelets }, index) {
 
 /** One side of a road. */
 class Edge {
+  line;
+  outward;
+  station;
+  length;
+
   /**
-   * @param {number[]} line flat
-   * @param {number} outward from its direction [rad]
-   * @param {number} station of its start, counted along the road [m]
+   * @param line flat
+   * @param outward from its direction [rad]
+   * @param station of its start, counted along the road [m]
    */
-  constructor(line, outward, station) {
+  constructor(line: number[], outward: number, station: number) {
     this.line = line;
     this.outward = outward;
     this.station = station;
     this.length = lengthOf(line);
   }
 
-  /**
-   * @param {number} s along the line [m]
-   * @returns {EdgePose}
-   */
-  at(s) {
+  /** @param s along the line [m] */
+  at(s: number): EdgePose {
     const { x, y, yaw } = poseAlong(this.line, s);
     return { x, y, yaw: yaw + this.outward };
   }
 
   /**
-   * @param {number} spacing [m]
-   * @returns {number[]} distances along the line whose station is a multiple of the spacing
+   * @param spacing [m]
+   * @returns distances along the line whose station is a multiple of the spacing
    */
-  multiples(spacing) {
+  multiples(spacing: number): number[] {
     const found = [];
     for (let s = Math.ceil(this.station / spacing) * spacing - this.station; s < this.length;
       s += spacing) {
@@ -199,18 +193,15 @@ class Edge {
 /**
  * Return the stations along the roads: a lanelet begins where its predecessor ends.
  *
- * @param {Lanelet[]} lanelets
- * @returns {Map<number, number>} station of each start, by id [m]
+ * @returns station of each start, by id [m]
  */
-export function stationsOf(lanelets) {
+export function stationsOf(lanelets: Lanelet[]): Map<number, number> {
   const byId = new Map(lanelets.map((lanelet) => [lanelet.id, lanelet]));
   const followers = new Set(lanelets.flatMap(({ successors }) => successors));
-  /** @type {Map<number, number>} */
-  const stations = new Map();
+  const stations = new Map<number, number>();
   const begin = [...lanelets.filter(({ id }) => !followers.has(id)), ...lanelets];
   for (const first of begin) {
-    /** @type {[Lanelet, number][]} */
-    const open = stations.has(first.id) ? [] : [[first, 0]];
+    const open: [Lanelet, number][] = stations.has(first.id) ? [] : [[first, 0]];
     for (let next = open.pop(); next !== undefined; next = open.pop()) {
       const [lanelet, station] = next;
       if (!stations.has(lanelet.id)) {
@@ -229,14 +220,11 @@ export function stationsOf(lanelets) {
 }
 
 /**
- * @param {Stand[]} row
- * @param {Edge} edge
- * @param {number} spacing [m]
- * @param {number} beside [m]
- * @param {RoadIndex} index
- * @param {Taken} taken
+ * @param spacing [m]
+ * @param beside [m]
  */
-function placeRow(row, edge, spacing, beside, index, taken) {
+function placeRow(row: Stand[], edge: Edge, spacing: number, beside: number, index: RoadIndex,
+  taken: Taken) {
   for (const s of edge.multiples(spacing)) {
     const { x, y, yaw } = beyond(edge.at(s), beside);
     if (index.isClear(x, y, 0.8 * beside) && taken.claim(x, y, 1.5)) {
@@ -245,16 +233,8 @@ function placeRow(row, edge, spacing, beside, index, taken) {
   }
 }
 
-/**
- * @param {Roadside} roadside
- * @param {Edge} edge
- * @param {RoadClass} kind
- * @param {RoadIndex} index
- * @param {RoadPoints} points
- * @param {Taken} taken
- * @param {() => number} random
- */
-function placeTrees({ trees, firs }, edge, kind, index, points, taken, random) {
+function placeTrees({ trees, firs }: Roadside, edge: Edge, kind: RoadClass, index: RoadIndex,
+  points: RoadPoints, taken: Taken, random: () => number) {
   for (let s = TREE_EVERY_M * random(); s < edge.length; s += TREE_EVERY_M * (0.5 + random())) {
     const [chance, far, large, shade, type] = [random(), random(), random(), random(), random()];
     if (chance > TREE_SHARE[kind]) {
@@ -272,15 +252,8 @@ function placeTrees({ trees, firs }, edge, kind, index, points, taken, random) {
   }
 }
 
-/**
- * @param {Stand[]} houses
- * @param {Edge} edge
- * @param {RoadIndex} index
- * @param {RoadPoints} points
- * @param {Taken} taken
- * @param {() => number} random
- */
-function placeHouses(houses, edge, index, points, taken, random) {
+function placeHouses(houses: Stand[], edge: Edge, index: RoadIndex, points: RoadPoints,
+  taken: Taken, random: () => number) {
   for (let s = HOUSE_EVERY_M * random(); s < edge.length; s += HOUSE_EVERY_M) {
     const [far, wide, deep, high, shade] = [random(), random(), random(), random(), random()];
     const [length, width, height] = [9 + 6 * wide, 8 + 3 * deep, 4.5 + 5 * high];
@@ -299,12 +272,10 @@ function placeHouses(houses, edge, index, points, taken, random) {
  * Place groups of trees outside of the map's box, which is convex, so that no line of sight
  * crosses them.
  *
- * @param {Roadside} roadside
- * @param {Box} bounds of the map
- * @param {Taken} taken
- * @param {() => number} random
+ * @param bounds of the map
  */
-function placeAround({ trees, firs }, [xmin, ymin, xmax, ymax], taken, random) {
+function placeAround({ trees, firs }: Roadside, [xmin, ymin, xmax, ymax]: Box, taken: Taken,
+  random: () => number) {
   const [middle_x, middle_y] = [(xmin + xmax) / 2, (ymin + ymax) / 2];
   const [half_x, half_y] = [(xmax - xmin) / 2, (ymax - ymin) / 2];
   for (let group = 0; group < GROUPS_AROUND; group += 1) {
@@ -326,20 +297,12 @@ function placeAround({ trees, firs }, [xmin, ymin, xmax, ymax], taken, random) {
   }
 }
 
-/**
- * @param {EdgePose} pose
- * @param {number} distance in its direction [m]
- * @returns {EdgePose}
- */
-function beyond({ x, y, yaw }, distance) {
+/** @param distance in its direction [m] */
+function beyond({ x, y, yaw }: EdgePose, distance: number): EdgePose {
   return { x: x + distance * Math.cos(yaw), y: y + distance * Math.sin(yaw), yaw };
 }
 
-/**
- * @param {number} x
- * @param {number} y
- * @param {number} cell [m]
- */
-function keyOf(x, y, cell) {
+/** @param cell [m] */
+function keyOf(x: number, y: number, cell: number) {
   return `${Math.floor(x / cell)} ${Math.floor(y / cell)}`;
 }

@@ -6,12 +6,12 @@ import { geometryOf } from './materials.js';
 import { NearInstances } from './near_instances.js';
 import { fir, house, lamp, plainFir, plainPost, plainTree, post, tree } from './scenery_shapes.js';
 
-/** @import { Origin } from '../local_origin.js' */
-/** @import { Heights } from './mesh_parts.js' */
-/** @import { Material } from 'three' */
-/** @import { Roadside } from './roadside.js' */
-/** @import { Sight } from '../seen_instances.js' */
-/** @typedef {typeof import('../three.js')} Three */
+import type { Origin } from '../local_origin.js';
+import type { Heights } from './mesh_parts.js';
+import type { Material } from 'three';
+import type { Roadside } from './roadside.js';
+import type { Sight } from '../seen_instances.js';
+import type { Three } from '../three.js';
 
 const LEAVES = [0x5f7f3c, 0x6f8f48, 0x4f7236, 0x7c9150];
 const NEEDLES = [0x3d5f3c, 0x48693f, 0x365438];
@@ -21,23 +21,17 @@ const NEAREST = { posts: [240, 700], lamps: [200, 500], trees: [420, 650], firs:
 
 /** The instances of all roadside objects. */
 export class Scenery {
-  /** @type {NearInstances[]} */
-  #kinds = [];
+  #kinds: NearInstances[] = [];
 
-  /**
-   * @param {Three} three the library
-   * @param {Roadside} roadside
-   * @param {Origin} origin
-   * @param {Heights} heights
-   * @param {Material} painted
-   */
-  constructor(three, roadside, origin, heights, painted) {
+  /** @param three the library */
+  constructor(three: Three, roadside: Roadside, origin: Origin, heights: Heights,
+    painted: Material) {
     const shapes = { posts: post(), lamps: lamp(), trees: tree(), firs: fir(), houses: house() };
     const plain = { trees: plainTree(), firs: plainFir(), posts: plainPost(),
       lamps: lamp(), houses: house() };
     const tones = { posts: [0xffffff], lamps: [0xffffff], trees: LEAVES, firs: NEEDLES,
       houses: WALLS };
-    for (const kind of /** @type {(keyof Roadside)[]} */ (Object.keys(shapes))) {
+    for (const kind of Object.keys(shapes) as (keyof Roadside)[]) {
       const instances = roadside[kind].map(({ x, y, yaw, size, shade }) => ({
         x: x - origin.x, y: y - origin.y, z: heights(x, y), yaw, size,
         color: tones[kind][Math.floor(shade * tones[kind].length)] }));
@@ -57,13 +51,12 @@ export class Scenery {
     return this.#kinds.reduce((sum, { triangles }) => sum + triangles, 0);
   }
 
-  /** @param {{x: number, y: number}} eye */
-  update(eye) {
+  update(eye: { x: number; y: number }) {
     this.#kinds.forEach((kind) => kind.update(eye));
   }
 
-  /** @param {Sight} sight of the camera that draws next */
-  see(sight) {
+  /** @param sight of the camera that draws next */
+  see(sight: Sight) {
     this.#kinds.forEach((kind) => kind.see(sight));
   }
 

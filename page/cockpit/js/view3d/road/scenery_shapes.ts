@@ -4,10 +4,9 @@
 
 import { MeshParts } from './mesh_parts.js';
 
-/** @import { Rgb } from './mesh_parts.js' */
+import type { Rgb } from './mesh_parts.js';
 
-/** @type {Record<string, Rgb>} */
-const COLOR = {
+const COLOR: Record<string, Rgb> = {
   white: [238, 238, 234], black: [36, 36, 38], reflector: [236, 236, 255], steel: [128, 132, 136],
   lamp: [226, 224, 210], bark: [92, 74, 58], leaves: [255, 255, 255], wall: [255, 255, 255],
   roof: [120, 66, 54], window: [70, 84, 98],
@@ -22,12 +21,11 @@ const shapeParts = () => new MeshParts({ x: 0, y: 0 });
 /**
  * Add a body of revolution around the vertical: a trunk, a cone, a ball of a few rings.
  *
- * @param {MeshParts} parts
- * @param {[radius: number, height: number][]} profile from below
- * @param {Rgb} color
- * @param {number} [round] how many corners it has
+ * @param profile from below
+ * @param round how many corners it has
  */
-export function addRound(parts, profile, color, round = ROUND) {
+export function addRound(parts: MeshParts, profile: [radius: number, height: number][], color: Rgb,
+  round = ROUND) {
   const first = parts.ranks.length;
   profile.forEach(([radius, z], level) => {
     const [r0, z0] = profile[Math.max(level - 1, 0)];
@@ -36,8 +34,8 @@ export function addRound(parts, profile, color, round = ROUND) {
     for (let k = 0; k < round; k += 1) {
       const angle = 2 * Math.PI * k / round;
       const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
-      const shade = /** @type {Rgb} */ (color.map(
-        (value) => value * (0.72 + 0.28 * (level / Math.max(profile.length - 1, 1)))));
+      const shade = color.map(
+        (value) => value * (0.72 + 0.28 * (level / Math.max(profile.length - 1, 1)))) as Rgb;
       parts.vertex(radius * cos, radius * sin, z, shade, 0,
         [cos * (z1 - z0) / slope, sin * (z1 - z0) / slope, (r0 - r1) / slope]);
       if (level > 0) {
@@ -49,15 +47,9 @@ export function addRound(parts, profile, color, round = ROUND) {
   });
 }
 
-/**
- * Add a box's sides and top.
- *
- * @param {MeshParts} parts
- * @param {[x: number, y: number, z: number]} from
- * @param {[x: number, y: number, z: number]} to
- * @param {Rgb} color
- */
-export function addBox(parts, [x0, y0, z0], [x1, y1, z1], color) {
+/** Add a box's sides and top. */
+export function addBox(parts: MeshParts, [x0, y0, z0]: [x: number, y: number, z: number],
+  [x1, y1, z1]: [x: number, y: number, z: number], color: Rgb) {
   parts.addWall([x0, y0, x1, y0, x1, y1, x0, y1, x0, y0], () => z0, () => z1, color);
   parts.addFaces([x0, y0, x1, y0, x1, y1, x0, y1], [0, 1, 2, 0, 2, 3], () => z1, color, 0);
 }
@@ -136,8 +128,7 @@ export function house() {
   }
   const slope = 1 / Math.hypot(0.55, ridge - eaves);
   for (const side of [-1, 1]) {
-    /** @type {[number, number, number]} */
-    const normal = [side * slope * (ridge - eaves), 0, slope * 0.55];
+    const normal: [number, number, number] = [side * slope * (ridge - eaves), 0, slope * 0.55];
     const first = parts.vertex(side * 0.55, -0.53, eaves - 0.02, COLOR.roof, 0, normal);
     parts.vertex(side * 0.55, 0.53, eaves - 0.02, COLOR.roof, 0, normal);
     parts.vertex(0, 0.53, ridge, COLOR.roof, 0, normal);

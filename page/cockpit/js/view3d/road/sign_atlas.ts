@@ -4,9 +4,10 @@
 
 import { SYMBOLS } from './sign_symbols.js';
 
-/** @import { Face, PlateShape } from './sign_faces.js' */
-/** @typedef {CanvasRenderingContext2D} Context */
-/** @typedef {[left: number, top: number, right: number, bottom: number]} Cell 0 to 1 */
+import type { Face, PlateShape } from './sign_faces.js';
+
+export type Context = CanvasRenderingContext2D;
+export type Cell = [left: number, top: number, right: number, bottom: number]; // 0 to 1
 
 const CELL_PX = 128;
 const COLUMNS = 8;
@@ -20,8 +21,7 @@ const WHITE = '#f6f6f2';
 const BACK = '#7d8287';
 const FONT = 'Arial, Helvetica, "Liberation Sans", sans-serif';
 
-/** @type {Record<Face['style'], {field: string, ink: string}>} */
-const STYLES = {
+const STYLES: Record<Face['style'], { field: string; ink: string }> = {
   prohibit: { field: WHITE, ink: BLACK }, end: { field: WHITE, ink: '#8d8f92' },
   order: { field: BLUE, ink: WHITE }, warn: { field: WHITE, ink: BLACK },
   stop: { field: RED, ink: WHITE }, yield: { field: WHITE, ink: BLACK },
@@ -30,8 +30,8 @@ const STYLES = {
   green: { field: '#f4c300', ink: '#0d6b3c' }, red: { field: RED, ink: WHITE },
 };
 
-/** @type {Record<PlateShape, number[]>} corners from -1 to 1 with y down; none of a circle */
-const OUTLINES = {
+/** Corners from -1 to 1 with y down; none of a circle. */
+const OUTLINES: Record<PlateShape, number[]> = {
   circle: [], triangle: [0, -0.87, 1, 0.87, -1, 0.87], yield: [0, 0.87, -1, -0.87, 1, -0.87],
   octagon: [-0.41, -1, 0.41, -1, 1, -0.41, 1, 0.41, 0.41, 1, -0.41, 1, -1, 0.41, -1, -0.41],
   diamond: [0, -1, 1, 0, 0, 1, -1, 0], square: [-1, -1, 1, -1, 1, 1, -1, 1],
@@ -41,31 +41,20 @@ const OUTLINES = {
 /** An atlas that draws each face once. */
 export class SignAtlas {
   canvas = document.createElement('canvas');
-  /** @type {Map<string, Cell>} */
-  #cells = new Map();
+  #cells = new Map<string, Cell>();
 
   constructor() {
     this.canvas.width = CELL_PX * COLUMNS;
     this.canvas.height = CELL_PX * ROWS;
   }
 
-  /**
-   * Return the place of a face.
-   *
-   * @param {Face} face
-   * @returns {Cell}
-   */
-  cellOf(face) {
+  /** Return the place of a face. */
+  cellOf(face: Face): Cell {
     return this.#cell(JSON.stringify(face), (context) => drawFace(context, face));
   }
 
-  /**
-   * Return the place of a plate's grey back.
-   *
-   * @param {PlateShape} shape
-   * @returns {Cell}
-   */
-  backOf(shape) {
+  /** Return the place of a plate's grey back. */
+  backOf(shape: PlateShape): Cell {
     return this.#cell(shape, (context) => {
       context.fillStyle = BACK;
       outline(context, shape, 1);
@@ -73,12 +62,7 @@ export class SignAtlas {
     });
   }
 
-  /**
-   * @param {string} key
-   * @param {(context: Context) => void} draw
-   * @returns {Cell}
-   */
-  #cell(key, draw) {
+  #cell(key: string, draw: (context: Context) => void): Cell {
     const known = this.#cells.get(key);
     if (known !== undefined) {
       return known;
@@ -86,7 +70,7 @@ export class SignAtlas {
     // If a map has more plates than cells, the rest share the last cell.
     const at = Math.min(this.#cells.size, COLUMNS * ROWS - 1);
     const [column, row] = [at % COLUMNS, Math.floor(at / COLUMNS)];
-    const context = /** @type {Context} */ (this.canvas.getContext('2d'));
+    const context = this.canvas.getContext('2d') as Context;
     context.save();
     context.clearRect(column * CELL_PX, row * CELL_PX, CELL_PX, CELL_PX);
     context.translate((column + 0.5) * CELL_PX, (row + 0.5) * CELL_PX);
@@ -94,19 +78,13 @@ export class SignAtlas {
     context.lineJoin = 'round';
     draw(context);
     context.restore();
-    /** @type {Cell} */
-    const cell = [column / COLUMNS, row / ROWS, (column + 1) / COLUMNS, (row + 1) / ROWS];
+    const cell: Cell = [column / COLUMNS, row / ROWS, (column + 1) / COLUMNS, (row + 1) / ROWS];
     this.#cells.set(key, cell);
     return cell;
   }
 }
 
-/**
- * @param {Context} context
- * @param {PlateShape} shape
- * @param {number} size
- */
-function outline(context, shape, size) {
+function outline(context: Context, shape: PlateShape, size: number) {
   context.beginPath();
   if (shape === 'circle') {
     context.arc(0, 0, size, 0, 2 * Math.PI);
@@ -121,14 +99,9 @@ function outline(context, shape, size) {
   context.closePath();
 }
 
-/**
- * @param {Context} context
- * @param {Face} face
- */
-function drawFace(context, face) {
+function drawFace(context: Context, face: Face) {
   const { field, ink } = STYLES[face.style];
-  /** @type {(color: string, size: number) => void} */
-  const layer = (color, size) => {
+  const layer = (color: string, size: number) => {
     context.fillStyle = color;
     outline(context, face.shape, size);
     context.fill();
@@ -160,11 +133,7 @@ function drawFace(context, face) {
   }
 }
 
-/**
- * @param {Context} context
- * @param {Face} face
- */
-function drawContent(context, { shape, style, symbol, text }) {
+function drawContent(context: Context, { shape, style, symbol, text }: Face) {
   if (symbol === 'zone' || symbol === 'zone-end') {
     zone(context, text, symbol === 'zone-end');
   } else if (symbol === 'limit') {
@@ -185,12 +154,7 @@ function drawContent(context, { shape, style, symbol, text }) {
   }
 }
 
-/**
- * @param {Context} context
- * @param {string} text
- * @param {boolean} over
- */
-function zone(context, text, over) {
+function zone(context: Context, text: string, over: boolean) {
   context.fillStyle = over ? '#8d8f92' : RED;
   context.beginPath();
   context.arc(0, -0.2, 0.62, 0, 2 * Math.PI);
@@ -204,15 +168,9 @@ function zone(context, text, over) {
   words(context, 'ZONE', 0.7, 1.4, 0.36);
 }
 
-/**
- * Write text on a wide plate, in as many lines as it needs.
- *
- * @param {Context} context
- * @param {string} text
- */
-function lines(context, text) {
-  /** @type {string[]} */
-  const parts = [];
+/** Write text on a wide plate, in as many lines as it needs. */
+function lines(context: Context, text: string) {
+  const parts: string[] = [];
   for (const word of text.split(' ')) {
     const last = parts.at(-1);
     if (last === undefined || last.length + word.length >= LINE_LETTERS) {
@@ -229,13 +187,11 @@ function lines(context, text) {
 /**
  * Write text as large as fits.
  *
- * @param {Context} context
- * @param {string} text
- * @param {number} y of its middle
- * @param {number} room for its length
- * @param {number} size of the letters at most
+ * @param y of its middle
+ * @param room for its length
+ * @param size of the letters at most
  */
-function words(context, text, y, room, size) {
+function words(context: Context, text: string, y: number, room: number, size: number) {
   context.save();
   context.textAlign = 'center';
   context.textBaseline = 'middle';

@@ -7,31 +7,28 @@
  * common signs, and of TrafficSignIDUsa.
  */
 
-/** @typedef {'circle'|'triangle'|'yield'|'octagon'|'diamond'|'square'|'wide'|'tall'} PlateShape */
+export type PlateShape = 'circle' | 'triangle' | 'yield' | 'octagon' | 'diamond' | 'square'
+  | 'wide' | 'tall';
 
-/**
- * A plate: its outline, its style and its content.
- *
- * @typedef {object} Face
- * @property {PlateShape} shape
- * @property {'prohibit'|'end'|'order'|'warn'|'stop'|'yield'|'priority'|'blue'|'white'|'yellow'
- *   |'green'|'red'} style
- * @property {string} symbol a drawing's name, empty for none
- * @property {string} text
- */
+/** A plate: its outline, its style and its content. */
+export interface Face {
+  shape: PlateShape;
+  style: 'prohibit' | 'end' | 'order' | 'warn' | 'stop' | 'yield' | 'priority' | 'blue' | 'white'
+    | 'yellow' | 'green' | 'red';
+  symbol: string; // a drawing's name, empty for none
+  text: string;
+}
 
-/** @type {(symbol: string) => Face} */
-const warn = (symbol) => ({ shape: 'triangle', style: 'warn', symbol, text: '' });
-/** @type {(symbol: string, text?: string) => Face} */
-const prohibit = (symbol, text = '') => ({ shape: 'circle', style: 'prohibit', symbol, text });
-/** @type {(symbol: string, text?: string) => Face} */
-const order = (symbol, text = '') => ({ shape: 'circle', style: 'order', symbol, text });
-/** @type {(symbol: string, text?: string) => Face} */
-const end = (symbol, text = '') => ({ shape: 'circle', style: 'end', symbol, text });
-/** @type {(symbol: string, text?: string) => Face} */
-const blue = (symbol, text = '') => ({ shape: 'square', style: 'blue', symbol, text });
-/** @type {(style: Face['style'], text: string) => Face} */
-const wide = (style, text) => ({ shape: 'wide', style, symbol: '', text });
+const warn = (symbol: string): Face => ({ shape: 'triangle', style: 'warn', symbol, text: '' });
+const prohibit = (symbol: string, text = ''): Face => (
+  { shape: 'circle', style: 'prohibit', symbol, text });
+const order = (symbol: string, text = ''): Face => (
+  { shape: 'circle', style: 'order', symbol, text });
+const end = (symbol: string, text = ''): Face => ({ shape: 'circle', style: 'end', symbol, text });
+const blue = (symbol: string, text = ''): Face => (
+  { shape: 'square', style: 'blue', symbol, text });
+const wide = (style: Face['style'], text: string): Face => (
+  { shape: 'wide', style, symbol: '', text });
 
 const KMH = 3.6;
 // Limits are multiples of this; files contain rounded values [km/h].
@@ -40,8 +37,7 @@ const NEARLY_KMH = 0.3;
 // Most letters of a name on a plate.
 const LONGEST = 24;
 
-/** @type {Record<string, (value: string, country: string) => Face>} */
-const FACES = {
+const FACES: Record<string, (value: string, country: string) => Face> = {
   MAX_SPEED: (value, country) => (country === 'USA' || country === 'PRI'
     ? { shape: 'tall', style: 'white', symbol: 'limit', text: speedText(value) }
     : prohibit('', speedText(value))),
@@ -119,12 +115,12 @@ const FACES = {
 /**
  * Return the plate of a sign.
  *
- * @param {string} kind name in commonroad-io
- * @param {string} value additional value, as in the file
- * @param {string} country three letters
- * @returns {Face} for an unknown kind, a white plate with its name
+ * @param kind name in commonroad-io
+ * @param value additional value, as in the file
+ * @param country three letters
+ * @returns for an unknown kind, a white plate with its name
  */
-export function faceOf(kind, value, country) {
+export function faceOf(kind: string, value: string, country: string): Face {
   if (Object.hasOwn(FACES, kind)) {
     return FACES[kind](value.slice(0, LONGEST), country);
   }
@@ -139,10 +135,10 @@ export function faceOf(kind, value, country) {
 /**
  * Return a speed as written on signs.
  *
- * @param {string} value [m/s], as the file has it
- * @returns {string} [km/h], a multiple of 5 if it is nearly one; other text unchanged
+ * @param value [m/s], as the file has it
+ * @returns [km/h], a multiple of 5 if it is nearly one; other text unchanged
  */
-export function speedText(value) {
+export function speedText(value: string): string {
   const kmh = Number(value) * KMH;
   if (value.trim() === '' || !Number.isFinite(kmh)) {
     return value.slice(0, 4);

@@ -2,10 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The symbols on signs, drawn in a square from -1 to 1 with y down. */
 
-/** @typedef {CanvasRenderingContext2D} Context */
+export type Context = CanvasRenderingContext2D;
 
-/** @type {(context: Context, points: number[]) => void} */
-function fill(context, points) {
+function fill(context: Context, points: number[]) {
   context.beginPath();
   for (let i = 0; i < points.length; i += 2) {
     context.lineTo(points[i], points[i + 1]);
@@ -13,8 +12,7 @@ function fill(context, points) {
   context.fill();
 }
 
-/** @type {(context: Context, width: number, ...points: number[]) => void} */
-function stroke(context, width, ...points) {
+function stroke(context: Context, width: number, ...points: number[]) {
   context.lineWidth = width;
   context.beginPath();
   for (let i = 0; i < points.length; i += 2) {
@@ -23,37 +21,27 @@ function stroke(context, width, ...points) {
   context.stroke();
 }
 
-/** @type {(context: Context, x: number, y: number, radius: number) => void} */
-function dot(context, x, y, radius) {
+function dot(context: Context, x: number, y: number, radius: number) {
   context.beginPath();
   context.arc(x, y, radius, 0, 2 * Math.PI);
   context.fill();
 }
 
-/**
- * Draw an upward arrow, turned by some quarter turns to the right.
- *
- * @type {(context: Context, quarters: number) => void}
- */
-function arrow(context, quarters) {
+/** Draw an upward arrow, turned by some quarter turns to the right. */
+function arrow(context: Context, quarters: number) {
   context.save();
   context.rotate(quarters * Math.PI / 2);
   fill(context, [-0.13, 0.8, -0.13, -0.1, -0.5, -0.1, 0, -0.8, 0.5, -0.1, 0.13, -0.1, 0.13, 0.8]);
   context.restore();
 }
 
-/**
- * Draw an arrow that leads up, then to a side.
- *
- * @type {(context: Context, side: number) => void}
- */
-function turning(context, side) {
+/** Draw an arrow that leads up, then to a side. */
+function turning(context: Context, side: number) {
   stroke(context, 0.26, -0.3 * side, 0.8, -0.3 * side, -0.1, 0.2 * side, -0.1);
   fill(context, [0.1 * side, -0.55, 0.75 * side, -0.1, 0.1 * side, 0.35]);
 }
 
-/** @type {(context: Context, x: number, color: string, size: number) => void} */
-function vehicle(context, x, color, size) {
+function vehicle(context: Context, x: number, color: string, size: number) {
   context.save();
   context.fillStyle = color;
   context.translate(x, 0);
@@ -65,8 +53,7 @@ function vehicle(context, x, color, size) {
   context.restore();
 }
 
-/** @type {(context: Context, x: number, color: string) => void} */
-function lorry(context, x, color) {
+function lorry(context: Context, x: number, color: string) {
   context.save();
   context.fillStyle = color;
   fill(context, [x - 0.36, 0.36, x - 0.36, -0.5, x + 0.36, -0.5, x + 0.36, 0.36]);
@@ -75,8 +62,7 @@ function lorry(context, x, color) {
   context.restore();
 }
 
-/** @type {(context: Context, side: number) => void} */
-function curve(context, side) {
+function curve(context: Context, side: number) {
   context.lineWidth = 0.2;
   context.beginPath();
   context.moveTo(-0.25 * side, 0.75);
@@ -85,8 +71,7 @@ function curve(context, side) {
   fill(context, [0.25 * side - 0.28, -0.3, 0.25 * side, -0.75, 0.25 * side + 0.28, -0.3]);
 }
 
-/** @type {Record<string, (context: Context) => void>} */
-export const SYMBOLS = {
+export const SYMBOLS: Record<string, (context: Context) => void> = {
   up: (c) => arrow(c, 0),
   'across-right': (c) => arrow(c, 1),
   'across-left': (c) => arrow(c, -1),

@@ -9,22 +9,22 @@ import { NearInstances } from './near_instances.js';
 import { SignAtlas } from './sign_atlas.js';
 import { faceOf } from './sign_faces.js';
 
-/** @import { CanvasTexture, Material } from 'three' */
-/** @import { Origin } from '../local_origin.js' */
-/** @import { Heights } from './mesh_parts.js' */
-/** @import { PlateShape } from './sign_faces.js' */
-/** @import { SignPole } from './poles.js' */
-/** @import { Cell } from './sign_atlas.js' */
-/** @import { Sight } from '../seen_instances.js' */
-/** @typedef {typeof import('../three.js')} Three */
+import type { CanvasTexture, Material } from 'three';
+import type { Origin } from '../local_origin.js';
+import type { Heights } from './mesh_parts.js';
+import type { PlateShape } from './sign_faces.js';
+import type { SignPole } from './poles.js';
+import type { Cell } from './sign_atlas.js';
+import type { Sight } from '../seen_instances.js';
+import type { Three } from '../three.js';
 
 // Heights of the lower edge of the lowest plate, and of one above a road [m].
 const LOWEST_M = 2.0;
 const HANGING_M = 5.2;
 const GAP_M = 0.06;
 const PLATE_OFF_POLE_M = 0.045;
-/** @type {Record<PlateShape, number>} edge of the square that a plate is drawn in [m] */
-const SIZE_M = {
+/** Edge of the square that a plate is drawn in [m]. */
+const SIZE_M: Record<PlateShape, number> = {
   circle: 0.75, triangle: 0.95, yield: 0.95, octagon: 0.95, diamond: 0.85, square: 0.8, wide: 1.7,
   tall: 1.0,
 };
@@ -39,21 +39,19 @@ export class Signs {
   #poles;
 
   /**
-   * @param {Three} three the library
-   * @param {SignPole[]} signs
-   * @param {string} country three letters
-   * @param {Origin} origin
-   * @param {Heights} heights
-   * @param {Material} painted of the poles
+   * @param three the library
+   * @param country three letters
+   * @param painted of the poles
    */
-  constructor(three, signs, country, origin, heights, painted) {
+  constructor(three: Three, signs: SignPole[], country: string, origin: Origin, heights: Heights,
+    painted: Material) {
     const atlas = new SignAtlas();
     const quads = new PlateQuads(origin);
     const poles = signs.map((sign) => {
       const ground = heights(sign.x, sign.y);
       const top = quads.addPole(sign, ground, atlas, country);
       return { x: sign.x - origin.x, y: sign.y - origin.y, z: ground, yaw: 0,
-        size: /** @type {[number, number, number]} */ ([1, 1, sign.hangs ? 0 : top - ground]),
+        size: [1, 1, sign.hangs ? 0 : top - ground] as [number, number, number],
         color: STEEL };
     });
     this.#texture = plateTexture(three, atlas.canvas);
@@ -75,13 +73,12 @@ export class Signs {
     return (this.#plates.geometry.index?.count ?? 0) / 3 + this.#poles.triangles;
   }
 
-  /** @param {{x: number, y: number}} eye */
-  update(eye) {
+  update(eye: { x: number; y: number }) {
     this.#poles.update(eye);
   }
 
-  /** @param {Sight} sight of the camera that draws next */
-  see(sight) {
+  /** @param sight of the camera that draws next */
+  see(sight: Sight) {
     this.#poles.see(sight);
   }
 
@@ -94,12 +91,7 @@ export class Signs {
   }
 }
 
-/**
- * @param {Three} three
- * @param {HTMLCanvasElement} canvas
- * @returns {CanvasTexture}
- */
-export function plateTexture(three, canvas) {
+export function plateTexture(three: Three, canvas: HTMLCanvasElement): CanvasTexture {
   const texture = new three.CanvasTexture(canvas);
   texture.colorSpace = three.SRGBColorSpace;
   texture.anisotropy = 8;
@@ -108,39 +100,32 @@ export function plateTexture(three, canvas) {
 
 /** Upright squares with pictures. */
 export class PlateQuads {
-  /** @type {number[]} */
-  positions = [];
-  /** @type {number[]} */
-  normals = [];
-  /** @type {number[]} */
-  uvs = [];
-  /** @type {number[]} */
-  indices = [];
+  positions: number[] = [];
+  normals: number[] = [];
+  uvs: number[] = [];
+  indices: number[] = [];
   #origin;
 
-  /** @param {Origin} origin */
-  constructor(origin) {
+  constructor(origin: Origin) {
     this.#origin = origin;
   }
 
   /**
    * Add the plates of a pole, the first on top, and their backs.
    *
-   * @param {SignPole} pole
-   * @param {number} ground its height [m]
-   * @param {SignAtlas} atlas
-   * @param {string} country
-   * @returns {number} the height of the topmost edge [m]
+   * @param ground its height [m]
+   * @returns the height of the topmost edge [m]
    */
-  addPole({ x, y, yaw, hangs, plates }, ground, atlas, country) {
+  addPole({ x, y, yaw, hangs, plates }: SignPole, ground: number, atlas: SignAtlas,
+    country: string): number {
     let bottom = ground + (hangs ? HANGING_M : LOWEST_M);
     for (const { kind, value } of plates.toReversed()) {
       const face = faceOf(kind, value, country);
       const size = SIZE_M[face.shape];
       const height = face.shape === 'wide' ? size / 2 : size;
       const z = bottom + height / 2;
-      const off = (/** @type {number} */ meters) => /** @type {const} */ (
-        [x - meters * Math.cos(yaw), y - meters * Math.sin(yaw)]);
+      const off = (
+        meters: number) => [x - meters * Math.cos(yaw), y - meters * Math.sin(yaw)] as const;
       this.add(...off(PLATE_OFF_POLE_M), z, yaw, size, atlas.cellOf(face));
       this.add(...off(PLATE_OFF_POLE_M - 0.01), z, yaw + Math.PI, size, atlas.backOf(face.shape));
       bottom += height + GAP_M;
@@ -151,14 +136,13 @@ export class PlateQuads {
   /**
    * Add a square.
    *
-   * @param {number} x of its middle
-   * @param {number} y
-   * @param {number} z [m]
-   * @param {number} yaw heading of the traffic that sees it [rad]
-   * @param {number} size [m]
-   * @param {Cell} cell its picture
+   * @param x of its middle
+   * @param z [m]
+   * @param yaw heading of the traffic that sees it [rad]
+   * @param size [m]
+   * @param cell its picture
    */
-  add(x, y, z, yaw, size, [u0, v0, u1, v1]) {
+  add(x: number, y: number, z: number, yaw: number, size: number, [u0, v0, u1, v1]: Cell) {
     const left = { x: -Math.sin(yaw) * size / 2, y: Math.cos(yaw) * size / 2 };
     const first = this.positions.length / 3;
     for (const [side, up] of [[1, -1], [-1, -1], [-1, 1], [1, 1]]) {
@@ -170,8 +154,7 @@ export class PlateQuads {
     this.indices.push(first, first + 1, first + 2, first, first + 2, first + 3);
   }
 
-  /** @param {Three} three */
-  geometry(three) {
+  geometry(three: Three) {
     const geometry = new three.BufferGeometry();
     geometry.setAttribute('position', new three.Float32BufferAttribute(this.positions, 3));
     geometry.setAttribute('normal', new three.Float32BufferAttribute(this.normals, 3));

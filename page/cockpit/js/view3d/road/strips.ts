@@ -4,26 +4,17 @@
 
 import { addDashes, shifted } from '../../world/polyline.js';
 
-/** @import { Dash } from '../../world/marking_strokes.js' */
+import type { Dash } from '../../world/marking_strokes.js';
 
 /** A path that collects the pieces of `addDashes` as flat polylines. */
 class Pieces {
-  /** @type {number[][]} */
-  list = [];
+  list: number[][] = [];
 
-  /**
-   * @param {number} x
-   * @param {number} y
-   */
-  moveTo(x, y) {
+  moveTo(x: number, y: number) {
     this.list.push([x, y]);
   }
 
-  /**
-   * @param {number} x
-   * @param {number} y
-   */
-  lineTo(x, y) {
+  lineTo(x: number, y: number) {
     this.list[this.list.length - 1].push(x, y);
   }
 }
@@ -31,11 +22,11 @@ class Pieces {
 /**
  * Return the painted pieces of a line.
  *
- * @param {number[]} line flat polyline [m]
- * @param {Dash|null} dash null for all of it
- * @returns {number[][]} flat polylines
+ * @param line flat polyline [m]
+ * @param dash null for all of it
+ * @returns flat polylines
  */
-export function paintedPieces(line, dash) {
+export function paintedPieces(line: number[], dash: Dash | null): number[][] {
   if (dash === null) {
     return [line];
   }
@@ -48,10 +39,10 @@ export function paintedPieces(line, dash) {
 /**
  * Widen a line to a strip.
  *
- * @param {number[]} line flat polyline [m]
- * @param {number} width [m]
- * @returns {[left: number[], right: number[]]} its edges, flat, with as many points as the line
+ * @param line flat polyline [m]
+ * @param width [m]
+ * @returns its edges, flat, with as many points as the line
  */
-export function stripOf(line, width) {
+export function stripOf(line: number[], width: number): [left: number[], right: number[]] {
   return [shifted(line, width / 2), shifted(line, -width / 2)];
 }

@@ -9,19 +9,20 @@ import { addBox, addRound } from './scenery_shapes.js';
 import { PlateQuads, plateTexture } from './signs.js';
 import { SYMBOLS } from './sign_symbols.js';
 
-/** @import { BufferAttribute, Material } from 'three' */
-/** @import { Origin } from '../local_origin.js' */
-/** @import { Heights } from './mesh_parts.js' */
-/** @import { LightPole } from './poles.js' */
-/** @import { Cell } from './sign_atlas.js' */
-/** @import { Sight } from '../seen_instances.js' */
-/** @typedef {typeof import('../three.js')} Three */
+import type { BufferAttribute, Material } from 'three';
+import type { Origin } from '../local_origin.js';
+import type { Heights } from './mesh_parts.js';
+import type { LightPole } from './poles.js';
+import type { Cell } from './sign_atlas.js';
+import type { Sight } from '../seen_instances.js';
+import type { Instance } from './near_instances.js';
+import type { Three } from '../three.js';
 
 /** Lamps from the top, and the lit ones of each state. */
-export const LAMPS = /** @type {const} */ (['red', 'yellow', 'green']);
-/** @type {Record<string, readonly string[]|undefined>} */
-export const LIT = { red: ['red'], redYellow: ['red', 'yellow'], yellow: ['yellow'],
-  green: ['green'] };
+export const LAMPS = ['red', 'yellow', 'green'] as const;
+export const LIT: Record<string, readonly string[] | undefined> = {
+  red: ['red'], redYellow: ['red', 'yellow'], yellow: ['yellow'], green: ['green'],
+};
 const COLORS = { red: 0xff3b2c, yellow: 0xffc21f, green: 0x1fe08a };
 const OFF = 0x24272b;
 /** Middle of the lowest lamp above the road [m]. */
@@ -33,10 +34,11 @@ const HOUSING_M = 0.14;
 const MOST = 200;
 const REACH_M = 700;
 const MASK_PX = 128;
-/** @type {Record<string, string[]>} */
-const ARROWS = { left: ['across-left'], right: ['across-right'], straight: ['up'],
+const ARROWS: Record<string, string[]> = {
+  left: ['across-left'], right: ['across-right'], straight: ['up'],
   leftStraight: ['across-left', 'up'], straightRight: ['up', 'across-right'],
-  leftRight: ['across-left', 'across-right'], all: [] };
+  leftRight: ['across-left', 'across-right'], all: [],
+};
 
 /** All traffic lights of a scene. */
 export class TrafficLights {
@@ -46,25 +48,22 @@ export class TrafficLights {
   #lamps;
   #poles;
   #housings;
-  /** @type {(string|undefined)[]} */
-  #shown;
+  #shown: (string | undefined)[];
 
   /**
-   * @param {Three} three the library
-   * @param {LightPole[]} lights
-   * @param {Origin} origin
-   * @param {Heights} heights
-   * @param {Material} painted of poles and housings
+   * @param three the library
+   * @param painted of poles and housings
    */
-  constructor(three, lights, origin, heights, painted) {
+  constructor(three: Three, lights: LightPole[], origin: Origin, heights: Heights,
+    painted: Material) {
     this.#three = three;
     this.#lights = lights;
     this.#shown = lights.map(() => undefined);
     const masks = lampMasks();
     const quads = new PlateQuads(origin);
-    /** @type {(pole: LightPole, z: number) => import('./near_instances.js').Instance} */
-    const instance = (pole, z) => ({ x: pole.x - origin.x, y: pole.y - origin.y, z,
-      yaw: pole.yaw, size: [1, 1, 1], color: 0xffffff });
+    const instance = (pole: LightPole, z: number): Instance => ({
+      x: pole.x - origin.x, y: pole.y - origin.y, z, yaw: pole.yaw, size: [1, 1, 1],
+      color: 0xffffff });
     const feet = lights.map(({ x, y }) => heights(x, y));
     const bases = lights.map(({ hangs }, i) => feet[i] + (hangs ? HANGING_M : LOWEST_M));
     lights.forEach((pole, i) => {
@@ -98,13 +97,12 @@ export class TrafficLights {
   /**
    * Show the signals.
    *
-   * @param {Record<string, string>} states by the lights' ids
-   * @param {{x: number, y: number}} eye
+   * @param states by the lights' ids
    */
-  update(states, eye) {
+  update(states: Record<string, string>, eye: { x: number; y: number }) {
     this.#poles.update(eye);
     this.#housings.update(eye);
-    const colors = /** @type {BufferAttribute} */ (this.#lamps.geometry.attributes.color);
+    const colors = this.#lamps.geometry.attributes.color as BufferAttribute;
     const color = new this.#three.Color();
     this.#lights.forEach(({ light }, i) => {
       const state = states[light.id] ?? 'inactive';
@@ -122,8 +120,8 @@ export class TrafficLights {
     });
   }
 
-  /** @param {Sight} sight of the camera that draws next */
-  see(sight) {
+  /** @param sight of the camera that draws next */
+  see(sight: Sight) {
     this.#poles.see(sight);
     this.#housings.see(sight);
   }
@@ -138,19 +136,14 @@ export class TrafficLights {
   }
 }
 
-/**
- * Draw the masks of lamps, by direction.
- *
- * @returns {{canvas: HTMLCanvasElement, cells: Record<string, Cell>}}
- */
-function lampMasks() {
+/** Draw the masks of lamps, by direction. */
+function lampMasks(): { canvas: HTMLCanvasElement; cells: Record<string, Cell> } {
   const canvas = document.createElement('canvas');
   const names = Object.keys(ARROWS);
   canvas.width = MASK_PX * 8;
   canvas.height = MASK_PX;
-  const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
-  /** @type {Record<string, Cell>} */
-  const cells = {};
+  const context = canvas.getContext('2d') as CanvasRenderingContext2D;
+  const cells: Record<string, Cell> = {};
   names.forEach((name, i) => {
     context.save();
     context.translate((i + 0.5) * MASK_PX, MASK_PX / 2);

@@ -1,0 +1,81 @@
+// SPDX-FileCopyrightText: 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/**
+ * Types of the server's answers about runs and scenarios: no code here.
+ *
+ * The server's side is crgame_ros/cockpit/library.py and crgame_ros/cockpit/runs.
+ */
+
+import type { Scene } from './messages.js';
+
+// The answers of /api/runs and /api/runs/score about a run.
+export interface PastRun {
+  id: string;
+  name: string;
+  title: string;
+  scenario: string;
+  began_ms: number | null; // since 1970
+  duration_s: number | null; // of its recording
+  contacts: number | null; // null if unknown
+  closed: boolean; // whether it can be read
+  finished: boolean; // whether it can be deleted
+  own: boolean; // whether it belongs to this session
+  bytes: number;
+  files: { name: string; bytes: number }[];
+}
+
+export interface ScorePart {
+  name: string;
+  value: number | null;
+  weight: number;
+  definition: string;
+}
+
+export interface VehicleScore {
+  vehicle: string;
+  role: string;
+  score: number | null; // of 1
+  parts: ScorePart[];
+  distance: number | null; // [m]
+  fastest: number | null; // [m/s]
+  remarks: string[];
+}
+
+export interface Score { vehicles: VehicleScore[]; refusal: string }
+
+// Types of /api/scenarios, /api/preview, /api/planner and /api/load.
+export interface Entry {
+  id: string;
+  kind: 'game' | 'scenario' | 'upload';
+  name: string;
+  title: string;
+}
+
+export interface Offer {
+  folders: { name: string; entries: Entry[] }[];
+  planners: string[];
+  drivers: string[];
+}
+
+export interface PreviewAv {
+  id: string;
+  planner: string;
+  planning_problem: number | null;
+  options?: Record<string, string>;
+}
+
+export interface PlannerOption { name: string; wanted: string; default: string; meaning: string }
+
+export interface Preview {
+  scene: Scene;
+  states: { vehicles: (number | null)[][]; objects: (number | null)[][] }; // rows, as in frames
+  humans: { id: string; driver: string }[];
+  avs: PreviewAv[];
+  notices: string[];
+}
+
+export interface Choice {
+  id: string; // of an entry
+  humans: { id: string; driver: string }[];
+  avs: { id: string; planner: string; options?: Record<string, string> }[];
+}
