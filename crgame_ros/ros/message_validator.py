@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 import importlib
 import math
 import time
-from typing import Any
+from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.messages.contract import Topic
@@ -16,6 +16,14 @@ from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
+
+if TYPE_CHECKING:  # Messages are decoded here that this process never receives otherwise.
+    from builtin_interfaces.msg import Time
+    from nav_msgs.msg import OccupancyGrid, Odometry
+    from numpy.typing import NDArray
+    from sensor_msgs.msg import Joy, LaserScan
+    from std_msgs.msg import Float64MultiArray
+    from trajectory_msgs.msg import JointTrajectory
 
 # Largest position, speed and acceleration [m], [m/s], [m/s^2]; no stamp or time is below 0.
 LARGEST = 1e9
@@ -88,7 +96,7 @@ class MessageValidator:
         return message
 
 
-def _check_trajectory(message: Any, topic: Topic) -> None:
+def _check_trajectory(message: 'JointTrajectory', topic: Topic) -> None:
     least, most = topic.points
     points, joints = message.points, len(message.joint_names)
     if not least <= len(points) <= most:
@@ -109,7 +117,7 @@ def _check_trajectory(message: Any, topic: Topic) -> None:
     _check_numbers(np.frombuffer(b''.join(point.accelerations for point in points)), False)
 
 
-def _check_numbers(values: Any, finite: bool) -> None:
+def _check_numbers(values: 'NDArray[np.float64]', finite: bool) -> None:
     """Check that numbers have plausible magnitudes; NaN means absent where it is allowed."""
     if not len(values):
         return
@@ -121,24 +129,24 @@ def _check_numbers(values: Any, finite: bool) -> None:
         raise ValueError(f'{worst:g} is out of range or not a number')
 
 
-def _check_stamp(stamp: Any) -> None:
+def _check_stamp(stamp: 'Time') -> None:
     if stamp.sec < 0:
         raise ValueError(f'the stamp is {stamp.sec} s')
 
 
-def _check_joy(message: Any, _topic: Topic) -> None:
+def _check_joy(message: 'Joy', _topic: Topic) -> None:
     if not all(math.isfinite(value) for value in message.axes):
         raise ValueError('an axis is no finite number')
     _check_stamp(message.header.stamp)
 
 
-def _check_table(message: Any, _topic: Topic) -> None:
+def _check_table(message: 'Float64MultiArray', _topic: Topic) -> None:
     sizes = [dim.size for dim in message.layout.dim]
     if len(sizes) != 2 or sizes[0] * sizes[1] != len(message.data) or not len(message.data):
         raise ValueError(f'has {len(message.data)} numbers in a layout of {sizes}')
 
 
-def _check_grid(message: Any, _topic: Topic) -> None:
+def _check_grid(message: 'OccupancyGrid', _topic: Topic) -> None:
     info = message.info
     if info.width * info.height != len(message.data):
         raise ValueError(f'has {len(message.data)} cells for {info.height} x {info.width}')
@@ -148,14 +156,14 @@ def _check_grid(message: Any, _topic: Topic) -> None:
         raise ValueError('has no resolution and origin')
 
 
-def _check_scan(message: Any, _topic: Topic) -> None:
+def _check_scan(message: 'LaserScan', _topic: Topic) -> None:
     _check_stamp(message.header.stamp)
     if not all(math.isfinite(value) for value in (
             message.angle_min, message.angle_max, message.angle_increment, message.range_max)):
         raise ValueError('has no finite angles and horizon')
 
 
-def _check_odometry(message: Any, _topic: Topic) -> None:
+def _check_odometry(message: 'Odometry', _topic: Topic) -> None:
     _check_stamp(message.header.stamp)
     place, turn = message.pose.pose.position, message.pose.pose.orientation
     _check_numbers(np.array([place.x, place.y, turn.z, turn.w, message.twist.twist.linear.x]),

@@ -310,6 +310,20 @@ def test_no_agent_blocks_a_junction_behind_which_there_is_no_room() -> None:
     assert speeds[-1] == 0.0 and poses[-1, 0] + 2.25 < 118.25
 
 
+def test_an_agent_that_was_let_in_waits_if_the_room_behind_the_junction_is_gone() -> None:
+    """Somebody ahead drives on, and at once stands behind the junction; braking is easy yet."""
+    scenario = support.roads(
+        support.straight_lane(1, 0.0, 0.0, 200.0),
+        support.lane_strip(2, [(120.0, y) for y in np.linspace(-100.0, 100.0, 80)]))
+    drives = support.human(60.0, 0.0, 0.0, speed=9.0, until=75)
+    stands = support.human(127.5, 0.0, 0.0, since=75)
+    run = support.Run(scenario, TrafficSpec(), 0, [drives, stands], [
+        support.driving(1, [(20.0, 0.0, 0.0), (190.0, 0.0, 0.0)], 10.0)]).ticks(300)
+    poses, speeds = run.series(0)
+    assert 80.0 < poses[75, 0] < 100.0 and speeds[75] > 8.0
+    assert speeds[-1] == 0.0 and poses[-1, 0] + 2.25 < 118.25
+
+
 def test_an_agent_before_a_full_way_turns_off_after_a_while() -> None:
     left = [(100.0, 0.0), (104.0, 0.6), (107.0, 3.0), (108.5, 7.0), (108.5, 60.0)]
     scenario = support.roads(

@@ -5,7 +5,13 @@
 import math
 
 from crgame_ros.traffic.compiling.compiled import compiled
-from crgame_ros.traffic.crossing.exit_room import is_full, promise, Promises, QUEUE_GAP
+from crgame_ros.traffic.crossing.exit_room import (
+    has_filled,
+    is_full,
+    promise,
+    Promises,
+    QUEUE_GAP,
+)
 from crgame_ros.traffic.crossing.junctions import (
     Arrivals,
     BEFORE,
@@ -212,6 +218,8 @@ def _withdraws(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
         return True
     if hold <= 0.0 or not (agents.sees[slot] if agents.late[slot] else easy):
         return False
+    if easy and has_filled(k, rules, agents, at, i):
+        return True
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
         if meeting.other[n] < 0 and meeting.step[n] <= passage.granted[i] and _yields(
                 ticks, k, agents, passage, meeting, at, i, n):

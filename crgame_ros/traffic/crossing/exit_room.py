@@ -88,3 +88,16 @@ def is_full(k: int, rules: CrossingRules, promised: Promises, agents: AgentTable
         taken = promised.behind[way.lane[i, step + 1]] - promised.through[way.lane[i, step]]
     return bool(not passage.ring[i] and agents.insists_until[slot] <= k and (
         at.rear_stop[i] - taken < passage.end[i] + agents.length[slot] + rules.room))
+
+
+@compiled
+def has_filled(k: int, rules: CrossingRules, agents: AgentTable, at: Situation, i: int) -> bool:
+    """
+    Return whether there is no room any more behind the junction that an agent was let into.
+
+    It was let in behind others, which then left its way or halted later than they seemed to.
+    """
+    slot = at.slots[i]
+    end = agents.grant_left[slot] - 0.5 * agents.length[slot]
+    return bool(agents.insists_until[slot] <= k
+                and at.rear_stop[i] < end + agents.length[slot] + rules.room)
