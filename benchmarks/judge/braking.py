@@ -16,8 +16,8 @@ REACH = 60.0
 MARGIN = 0.2
 # Causes lie at most so far back [s].
 RECENT_S = 2.0
-# Hard enough to be forced by an object ahead [m/s^2].
-FORCED = 3.0
+# Hard enough to be forced by an object ahead, and to be a reason to brake [m/s^2].
+FORCED, FIRM = 3.0, 1.5
 
 
 def hard_brakings(history: History, roads: JudgedRoads) -> list[Event]:
@@ -35,6 +35,21 @@ def hard_brakings(history: History, roads: JudgedRoads) -> list[Event]:
             f'{cause}: {hardest:.1f} m/s^2 at {history.speed[first, agent]:.1f} m/s for '
             f'{(last - first + 1) * history.time_step_s:.1f} s, {seen}')))
     return events
+
+
+def leader_of(history: History, row: int, agent: int) -> int:
+    """Return whom an agent needs to brake for at a time, nearest on its further way, or -1."""
+    ahead, gap = _nearest(history, row, agent, _way(history, row, agent))
+    near = ahead >= 0 and (gap < 0.5 * history.speed[row, agent]
+                           or _needed(history, row, agent, ahead, gap) > FIRM)
+    return ahead if near else -1
+
+
+def _needed(history: History, row: int, agent: int, ahead: int, gap: float) -> float:
+    """Return the braking with which an agent takes the speed of one ahead in time [m/s^2]."""
+    closing = float(history.speed[row, agent]) - float(history.speed[row, ahead]) * float(np.cos(
+        history.poses[row, ahead, 2] - history.poses[row, agent, 2]))
+    return max(closing, 0.0)**2 / (2.0 * max(gap - 1.0, 0.1))
 
 
 def _way(history: History, row: int, agent: int) -> shapely.LineString:
@@ -75,9 +90,7 @@ def _cause(history: History, roads: JudgedRoads, lines: list[Stop], row: int, ag
     if row - history.born[row, agent] <= recent:
         return 'spawn'
     if ahead >= 0:
-        closing = speed - float(history.speed[row, ahead]) * float(np.cos(
-            history.poses[row, ahead, 2] - history.poses[row, agent, 2]))
-        forced = closing > 0.0 and closing**2 / (2.0 * max(gap - 1.0, 0.1)) > FORCED
+        forced = _needed(history, row, agent, ahead, gap) > FORCED
         if gap < 0.3:
             return 'overlap'
         if (forced or gap < 0.5 * speed) and row - history.born[row, ahead] <= recent:

@@ -7,7 +7,7 @@ Where two ways cross or merge, the file says which agent yields: the one with a 
 one that enters a roundabout; the one that turns across oncoming traffic; the one that sees the
 other come from its right (from its left where vehicles keep to the left). Junctions with lights,
 and those where all have to stop, are not judged. The right of way was taken where the other agent
-needed hard braking when the first one drove in, and braked.
+needed hard braking when the first one drove in, and braked, but not for somebody else ahead.
 """
 
 from collections.abc import Iterator
@@ -17,6 +17,7 @@ import itertools
 import math
 
 from commonroad.scenario.lanelet import LaneletType
+from judge.braking import leader_of
 from judge.history import Event, FloatArray, History, IntArray, Life, wrapped
 from judge.motion import accelerations
 from judge.roads import JudgedRoads, SHARED
@@ -231,8 +232,13 @@ def _forced(history: History, change: FloatArray, ground: Shared, one: Passage,
     needed = 2.0 * (speed * time - room) / time**2 if time <= 2.0 * room / speed \
         else speed**2 / (2.0 * max(room, 0.01))
     until = min(theirs, other.life.last)
-    braked = -float(change[enters:until, other.life.column].min(initial=0.0))
-    return (enters, needed, braked) if needed > NEEDED and braked > BRAKED else None
+    braking = -change[enters:until, other.life.column]
+    if needed <= NEEDED or not (braking > BRAKED).any():
+        return None
+    hardest = int(braking.argmax())
+    # It may have come up behind somebody else, who drives before it.
+    leader = leader_of(history, enters + hardest, other.life.column)
+    return (enters, needed, float(braking[hardest])) if leader in (-1, one.life.column) else None
 
 
 def zebra(history: History, roads: JudgedRoads) -> list[Event]:

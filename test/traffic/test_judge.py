@@ -367,6 +367,16 @@ def test_who_takes_the_right_of_way_is_told_by_signs_or_sides(
         [('forced', ('t1', 't0'), rule)] if rule and braking else [])
 
 
+@pytest.mark.parametrize(('ahead', 'count'), [(6.0, 0), (30.0, 1)])
+def test_who_brakes_for_somebody_ahead_has_lost_no_right_of_way(ahead: float, count: int) -> None:
+    """The one from the right brakes as before, but behind a third that does so this far ahead."""
+    one, other = along(EASTWARD, 8.0, 6.0, 43.0), drives_in(NORTHWARD, 7.0)
+    third = other + (0.0, ahead, 0.0)
+    found, ways_in = seen(one, other, third), crossing()
+    events = taken_priority(found, ways_in, lanes_of(found, ways_in))
+    assert [x.ids for x in events] == count * [('t1', 't0')]
+
+
 @pytest.mark.parametrize(('turns', 'count'), [(LEFT_TURN, 1), (EASTWARD, 0)])
 def test_a_left_turn_takes_the_right_of_way_of_oncoming_traffic(
         turns: Sequence[tuple[float, float]], count: int) -> None:
