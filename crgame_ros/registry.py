@@ -26,7 +26,7 @@ POLICY = 'policy:'
 VALUE_WORDS = {float: 'a number', int: 'a whole number', bool: 'true or false', str: 'a text',
                types.NoneType: 'null'}
 # Hints of a value of any kind.
-ANY_VALUE = (object, object)
+ANY_VALUE = (object, Any)
 
 
 class ModelRegistry:

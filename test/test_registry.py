@@ -68,6 +68,15 @@ def test_a_class_of_a_file(registry: ModelRegistry, file: str) -> None:
     assert registry.create(f'{file}:Straight', {'push': 2}, **GIVEN).push == 2.0
 
 
+@pytest.mark.parametrize('hint', ['', ': Any', ': object'])
+def test_an_option_may_be_of_any_kind(registry: ModelRegistry, tmp_path: Path, hint: str) -> None:
+    path = tmp_path / 'any.py'
+    path.write_text(f'from typing import Any\n{CODE.replace("push: float", f"push{hint}")}'
+                    .replace('if push > 5.0', 'if push is None'), encoding='utf-8')
+    made = registry.create(f'{path}:Straight', {'push': [1, 'two']}, **GIVEN)
+    assert made.push == [1, 'two']
+
+
 def test_entry_points_come_after_the_built_in_names(
         registry: ModelRegistry, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
