@@ -72,6 +72,17 @@ async def test_only_kinds_that_a_page_has_are_read(tmp_path: Path) -> None:
     assert found == {'js/a.js': 200, **dict.fromkeys(absent, 404)}
 
 
+@in_loop
+async def test_a_fault_in_a_script_is_told_with_its_place(tmp_path: Path) -> None:
+    (tmp_path / 'index.html').write_text('')
+    (tmp_path / 'a.ts').write_text('const a = 1;\nenum B { c }\n')
+    async with cockpit(page=tmp_path) as running:
+        status, answer = await get(running.port, '/static/a.js')
+    assert status == 500
+    assert answer.endswith(b'\r\n\r\na.ts: line 2, column 1: `enum B { c }` is more than a type, '
+                           b'and browsers do not know it\n')
+
+
 def test_a_missing_page_is_one_clear_error(tmp_path: Path) -> None:
     with pytest.raises(CrgameError, match='page of the cockpit is missing'):
         page_files.read_page(tmp_path)

@@ -3,7 +3,6 @@
 """Converts a study's Markdown pages to trees of page elements, without any raw HTML."""
 
 from collections.abc import Iterator
-import hashlib
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -84,7 +83,7 @@ def picture(study: StudyFile, name: str) -> PageFile | None:
         body = path.read_bytes()
     except (OSError, ValueError):
         return None
-    return PageFile(body, PICTURES[path.suffix.lower()], hashlib.sha256(body).hexdigest()[:32])
+    return PageFile(body, PICTURES[path.suffix.lower()])
 
 
 def _parser() -> MarkdownIt:
