@@ -181,7 +181,7 @@ class Traffic:
         self._changes.note_leaders(agents, slots, seen.gap, seen.leader)
         acceleration = following.accelerations(agents, seen, entries, standing)
         blocked = obstacles(seen.pairs, standing, len(slots))
-        halts = self._halts(k, seen, entries)
+        halts = self._halts(k, seen, entries, self._time_step_s)
         self._right_of_way.crosswalks.halt_before(bodies, self._others.stands, seen.way,
                                                   agents.table, slots, halts)
         following.halt(agents, seen, entries, bodies, blocked, drivers.change_lanes, halts,
@@ -204,11 +204,10 @@ class Traffic:
         slots = np.flatnonzero(agents.active)
         entries = place(self._graph.table, self._cells.table, with_agents(bodies, agents.table))
         seen = self._following.look(agents, slots, entries)
-        halts = self._halts(k, seen, entries, elapsed_s=0.0)
+        halts = self._halts(k, seen, entries, 0.0)
         self._spawner.slow_down(agents, slots, seen.desired, halts, newcomers)
 
-    def _halts(self, k: int, seen: Ahead, entries: Entries,
-               elapsed_s: float | None = None) -> FloatArray:
+    def _halts(self, k: int, seen: Ahead, entries: Entries, elapsed_s: float) -> FloatArray:
         """Return the distances (A) of the fronts from lights and junctions to halt at, or inf."""
         agents, routes = self._agents, self._routes
         halts, stuck = self._right_of_way.halts(

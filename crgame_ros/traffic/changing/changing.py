@@ -20,7 +20,7 @@ from crgame_ros.traffic.changing.lane_change_intents import (
     TOO_NEAR,
 )
 from crgame_ros.traffic.compiling.compiled import bare, compiled
-from crgame_ros.traffic.fleet.agents import Agents, AgentTable, centers_of, NONE
+from crgame_ros.traffic.fleet.agents import Agents, AgentTable, NONE
 from crgame_ros.traffic.fleet.routes import Routes
 from crgame_ros.traffic.following.drivers import Drivers
 from crgame_ros.traffic.following.leaders import first_from, Followers, Ways
@@ -260,10 +260,8 @@ class LaneChanges:
         """End the changes that are complete, and those that make no progress."""
         stuck = _finish(agents.table, self._give_up)
         if len(stuck):
-            graph, lane = self._graph, agents.source[stuck]
-            center, _ = centers_of(agents.table, stuck)
-            guess = agents.s[stuck] * graph.length[lane] / graph.length[agents.lane[stuck]]
-            s, d, _ = graph.project(lane, center[:, 0], center[:, 1], guess)
+            lane = agents.source[stuck]
+            s, d = agents.in_left_lanes(self._graph, stuck)
             # The agent goes to the lane whose middle is nearer.
             back = np.abs(d) < np.abs(agents.d[stuck])
             returns = stuck[back]

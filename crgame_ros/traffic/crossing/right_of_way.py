@@ -46,7 +46,7 @@ class RightOfWay:
 
     def __init__(self, graph: LaneGraph, roads: LaneletNetwork, conflicts: Conflicts,
                  movements: Movements, time_step_s: float) -> None:
-        self._graph, self._conflicts, self._time_step_s = graph, conflicts, time_step_s
+        self._graph, self._conflicts = graph, conflicts
         self.lines = StopLines(graph, roads, movements, time_step_s)
         self.crosswalks = Crosswalks(graph, roads)
         self._crossings = Crossings(conflicts, CrossingRules(), time_step_s)
@@ -54,12 +54,12 @@ class RightOfWay:
             round(seconds / time_step_s) for seconds in (WAITS, INSISTS, TURNS_OFF, LAST_RESORT))
 
     def halts(self, k: int, agents: Agents, seen: Ahead, entries: Entries, others: Others,
-              run_lights: BoolArray, elapsed_s: float | None) -> tuple[FloatArray, IntArray]:
+              run_lights: BoolArray, elapsed_s: float) -> tuple[FloatArray, IntArray]:
         """
         Let agents into junctions; return where the others halt.
 
         :param run_lights: whether a driver ignores lights, of all slots.
-        :param elapsed_s: since the last call; Delta t_c if it is None.
+        :param elapsed_s: time since the last call [s]
         :return: distances (A) of the fronts from lights and junctions to halt at, or inf [m]; the
             slots of agents that have stood so long that they had better go another way.
         """
@@ -84,7 +84,7 @@ class RightOfWay:
         halt, shut = self._crossings.halts(
             k, agents, way, passage, coming,
             Situation(slots, seen.desired, rear_stop, light, sign, queued),
-            self._time_step_s if elapsed_s is None else elapsed_s)
+            elapsed_s)
         behind = (agents.blocker[slots] == FREE) & (gap < QUEUE)
         agents.blocker[slots[behind]] = agents.leader[slots[behind]]
         # An agent that halts at a red light waits for no other, but one that halts before it may.

@@ -9,7 +9,7 @@ from typing import cast
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.traffic.compiling.compiled import bare, compiled
-from crgame_ros.traffic.lanes.lane_table import FloatArray, IntArray
+from crgame_ros.traffic.lanes.lane_graph import FloatArray, IntArray, LaneGraph
 import numpy as np
 from numpy.typing import NDArray
 
@@ -187,6 +187,14 @@ class Agents(AgentTable):
     def velocities(self) -> FloatArray:
         """Return the (A, 3) velocities of the centres [m/s, rad/s]."""
         return centers_of(self.table, np.arange(self.count))[1]
+
+    def in_left_lanes(self, graph: LaneGraph, slots: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return s and d (N) of the centres of agents in the lanes that they change from [m]."""
+        center, _ = centers_of(self.table, slots)
+        lane = self.source[slots]
+        guess = self.s[slots] * graph.length[lane] / graph.length[self.lane[slots]]
+        s, d, _ = graph.project(lane, center[:, 0], center[:, 1], guess)
+        return s, d
 
     def states(self) -> tuple[FloatArray, FloatArray]:
         """Return poses, their angles wrapped, and velocities of the centres; NaN where absent."""

@@ -5,7 +5,7 @@
 from typing import NamedTuple
 
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.traffic.fleet.agents import Agents, BoolArray, centers_of, NONE
+from crgame_ros.traffic.fleet.agents import Agents, BoolArray, NONE
 from crgame_ros.traffic.fleet.routes import Routes
 from crgame_ros.traffic.following.encounters import brush
 from crgame_ros.traffic.following.leaders import (
@@ -112,17 +112,15 @@ class Following:
     def _mind_left_lanes(self, agents: Agents, seen: Ahead, entries: Entries,
                          standing: BoolArray, acceleration: FloatArray) -> None:
         """Make agents that change lanes also follow the leader in the lane that they leave."""
-        graph, lanes = self._graph, self._graph.table
+        lanes = self._graph.table
         source = agents.source[seen.slots]
         row = np.flatnonzero((source != NONE) & (source != agents.lane[seen.slots]))
         if not len(row):
             return
-        slot, lane = seen.slots[row], source[row]
-        center, _ = centers_of(agents.table, slot)
-        guess = agents.s[slot] * graph.length[lane] / graph.length[agents.lane[slot]]
-        s, d, _ = graph.project(lane, center[:, 0], center[:, 1], guess)
+        slot = seen.slots[row]
+        s, d = agents.in_left_lanes(self._graph, slot)
         corridor = corridors(agents.table, slot, d, d)
-        way = ways(lanes, self._routes.next, agents.table, slot, lane, s)
+        way = ways(lanes, self._routes.next, agents.table, slot, source[row], s)
         pairs = ahead(lanes, agents.table, entries, way, corridor, NO_REFERENCE)
         pairs.gap[standing[pairs.entry]] += CLOSE
         acceleration[row] = np.minimum(acceleration[row], self.speeds.behind(
