@@ -58,6 +58,8 @@ TOOLS = (
           'crgame_ros.analysis.validate_command'),
     _Tool('new', 'a game file for any scenario, with seats for several people',
           'crgame_ros.new_command'),
+    _Tool('import', 'maps and data sets of other formats, to drive in',
+          'crgame_ros.worlds.command'),
     _Tool('rasterize', 'draw curbs and obstacles of a scenario as an occupancy map',
           'crgame_ros.occupancy.command'),
     _Tool('roads', 'turn way-points (CSV) into a scenario to drive on, or back',

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Exports a run as a CommonRoad 2020a scenario, on the grid of its time steps."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
 import errno
@@ -10,11 +9,10 @@ import math
 import os
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.scenario import ScenarioID
-from crgame_ros.errors import CrgameError, InputError, one_line
+from crgame_ros.errors import InputError, one_line
 from crgame_ros.game.objects import Role
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.paths import check_room
@@ -22,14 +20,14 @@ from crgame_ros.recording.export_objects import named, ObjectWriter
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.exact_values import exact_value
+from crgame_ros.scenario.export_document import scenario_document
 from crgame_ros.scenario.export_elements import exact_number, goal_state, planning_problem
 from crgame_ros.scenario.export_goals import goal_where_it_ended, goals_of
 from crgame_ros.scenario.export_ids import IdPool
-from crgame_ros.scenario.export_network import schema_errors, used_ids, write_roads
+from crgame_ros.scenario.export_network import used_ids, write_roads
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
 from crgame_ros.scenario.recorded_humans import human_note, SOURCE_MARK, without_human_notes
 from crgame_ros.whole_file import write_text
-from lxml import etree
 import numpy as np
 from numpy.typing import NDArray
 
@@ -134,7 +132,6 @@ def _initial_row(problem: PlanningProblem) -> list[float]:
 
 
 _HEAD_BYTES = 4096
-_ERRORS_TOLD = 3
 
 
 @dataclass(frozen=True)
@@ -197,7 +194,7 @@ def export_scenario(log: RunTrajectories, *, author: str | None = None,
     remark = f'{loaded.benchmark_id} {SOURCE_MARK}{human_note(humans)}'
     earlier = without_human_notes(header['source'])
     header['source'] = f'{earlier}; {remark}' if earlier else remark
-    text = _document(header, roads.elements, objects.text() + problems)
+    text = scenario_document(header, roads.elements, objects.text() + problems)
     return ExportedScenario(header['benchmarkID'], text, objects.ids, writer.ids,
                             tuple(map(one_line, notices)))
 
@@ -276,25 +273,3 @@ def _header(log: RunTrajectories, loaded: LoadedScenario, problems: int,
         'commonRoadVersion': '2020a', 'author': original.get('author', ''),
         'affiliation': original.get('affiliation', ''), 'source': original.get('source', ''),
         'benchmarkID': benchmark_id, 'date': day if guard.is_date(day) else '1970-01-01'}
-
-
-def _document(header: dict[str, str], network: Sequence[etree._Element], rest: str) -> str:
-    """
-    Build the file's text.
-
-    :raises CrgameError: if it violates the schema.
-    """
-    attributes = ' '.join(f'{name}={quoteattr(value)}' for name, value in header.items())
-    roads = ''.join(etree.tostring(element, encoding='unicode').rstrip() + '\n'
-                    for element in network)
-    text = (f"<?xml version='1.0' encoding='UTF-8'?>\n<commonRoad {attributes}>\n"
-            f'{roads}{rest}</commonRoad>\n')
-    try:
-        errors = schema_errors(etree.fromstring(text.encode('utf-8'),
-                                                etree.XMLParser(huge_tree=True)))
-    except etree.XMLSyntaxError as error:
-        errors = [str(error)]
-    if errors:
-        raise CrgameError('the exported scenario would break the CommonRoad schema: '
-                          + '; '.join(errors[:_ERRORS_TOLD]))
-    return text

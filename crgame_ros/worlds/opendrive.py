@@ -1,0 +1,173 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Prepares OpenDRIVE maps for the converter, which refuses much of what the standard allows."""
+
+from collections.abc import Iterable
+import math
+
+from lxml import etree
+
+# Elements with ids, and where else these ids stand: (element, attribute, condition).
+_REFERENCES = {
+    'road': (('connection', 'incomingRoad'), ('connection', 'connectingRoad'),
+             ('connection', 'linkedRoad')),
+    'junction': (('road', 'junction'),),
+    'signal': (('signalReference', 'id'), ('control', 'signalId')),
+    'object': (('objectReference', 'id'),)}
+# Of static signals: the converter fails on other countries' (some are written in two letters).
+_COUNTRIES = {'DE': 'DEU', 'US': 'USA', 'CN': 'CHN', 'ES': 'ESP'}
+_KNOWN = frozenset({*_COUNTRIES, *_COUNTRIES.values(), 'ZAM', 'OPENDRIVE'})
+_NO_ROAD = '-1'
+# A curve over 100 m with less deviates by a millimetre from a line or an arc [1/m].
+_SAME_CURVATURE = 1e-7
+_SAME_POINT = 0.01
+
+
+def prepare_opendrive(root: etree._Element) -> list[str]:
+    """
+    Change a map such that the converter reads it, and its coordinates stay metres.
+
+    :param root: of the map; changed in place.
+    :return: remarks on what is lost, one line each.
+    """
+    _keep_coordinates(root)
+    _number_ids(root)
+    _plain_curves(root)
+    _connect_directly(root)
+    return _four_corners(root) + _drop_foreign_signals(root)
+
+
+def _keep_coordinates(root: etree._Element) -> None:
+    """Remove what would make the converter project the map: web Mercator stretches it."""
+    for header in root.iterchildren('header'):
+        for element in header.findall('geoReference') + header.findall('offset'):
+            header.remove(element)
+
+
+def _number_ids(root: etree._Element) -> None:
+    """Replace ids that are no numbers; the standard allows any text."""
+    for tag, references in _REFERENCES.items():
+        named = [element for element in root.iter(tag) if element.get('id') is not None]
+        others = [(element, name) for kind, name in references for element in root.iter(kind)]
+        if tag in ('road', 'junction'):
+            others += [(element, 'elementId') for link in root.iterfind('road/link')
+                       for element in link if element.get('elementType') == tag]
+        words = [element.get('id') for element in named] + [
+            element.get(name) for element, name in others]
+        if all(_is_number(word) for word in words if word is not None):
+            continue
+        numbers = {word: str(number) for number, word in enumerate(dict.fromkeys(
+            word for word in words if word not in (None, _NO_ROAD)), 1)}
+        for element, name in [(element, 'id') for element in named] + others:
+            word = element.get(name)
+            if word in numbers:
+                element.set(name, numbers[word])
+
+
+def _is_number(word: str) -> bool:
+    return word.removeprefix('-').isdecimal()
+
+
+def _plain_curves(root: etree._Element) -> None:
+    """Write spirals of constant curvature as arcs, and arcs without curvature as lines."""
+    for spiral in list(root.iter('spiral')):
+        start, end = (float(spiral.get(name, 'nan')) for name in ('curvStart', 'curvEnd'))
+        if abs(start - end) < _SAME_CURVATURE:
+            spiral.getparent().replace(spiral, etree.Element('arc', curvature=repr(start)))
+    for arc in list(root.iter('arc')):
+        if abs(float(arc.get('curvature', 'nan'))) < _SAME_CURVATURE:
+            arc.getparent().replace(arc, etree.Element('line'))
+
+
+def _connect_directly(root: etree._Element) -> None:
+    """Name the road that a direct junction links as the one that leads through it."""
+    for connection in root.iterfind('junction/connection'):
+        if connection.get('connectingRoad') is None and connection.get('linkedRoad') is not None:
+            connection.set('connectingRoad', connection.get('linkedRoad'))
+
+
+def _four_corners(root: etree._Element) -> list[str]:
+    """
+    Give each crosswalk an outline of four corners in its own axes; the converter reads no other.
+
+    The road counts as straight along the crosswalk.
+    """
+    gone = []
+    for crosswalk in root.iterfind('road/objects/object[@type="crosswalk"]'):
+        corners = _corners(crosswalk)
+        for outline in crosswalk.findall('outline') + crosswalk.findall('outlines'):
+            crosswalk.remove(outline)
+        if corners is None:
+            gone.append(crosswalk)
+            continue
+        outline = etree.SubElement(crosswalk, 'outline')
+        for u, v in corners:
+            etree.SubElement(outline, 'cornerLocal', u=repr(u), v=repr(v), z='0', height='0')
+    _remove(gone)
+    return [f'{len(gone)} crosswalks without four corners are left out'] if gone else []
+
+
+def _corners(crosswalk: etree._Element) -> list[tuple[float, float]] | None:
+    """Return the corners of a crosswalk in its own axes [m]; None if they are not four."""
+    def number(element: etree._Element, name: str) -> float:
+        return float(element.get(name, 'nan'))
+
+    heading = float(crosswalk.get('hdg', '0'))
+    cosine, sine = math.cos(heading), math.sin(heading)
+    found = [(number(corner, 'u'), number(corner, 'v'))
+             for corner in crosswalk.iter('cornerLocal')]
+    for corner in crosswalk.iter('cornerRoad'):
+        along, aside = (number(corner, name) - number(crosswalk, name) for name in 'st')
+        found.append((along * cosine + aside * sine, aside * cosine - along * sine))
+    if not found:
+        u, v = (0.5 * number(crosswalk, name) for name in ('length', 'width'))
+        found = [(-u, -v), (u, -v), (u, v), (-u, v)]
+    if len(found) > 1 and math.dist(found[0], found[-1]) < _SAME_POINT:
+        found.pop()
+    return found if len(found) == 4 and all(map(math.isfinite, sum(found, ()))) else None
+
+
+def _drop_foreign_signals(root: etree._Element) -> list[str]:
+    """Remove signs without a type or of a country whose signs the converter does not know."""
+    gone = [signal for signal in root.iter('signal') if not _is_kept(signal)]
+    remarks = []
+    if gone:
+        kinds = sorted({f'{signal.get("country", "no country")} {signal.get("type", "no type")}'
+                        for signal in gone})
+        remarks.append(f'{len(gone)} signs of no known country or type are left out: '
+                       + ', '.join(kinds[:5]))
+    _remove(gone)
+    kept = {signal.get('id') for signal in root.iter('signal')}
+    _remove(reference for reference in list(root.iter('signalReference'))
+            if reference.get('id') not in kept)
+    return remarks
+
+
+def _is_kept(signal: etree._Element) -> bool:
+    """Return whether the converter knows a signal; complete what it needs of it."""
+    country = signal.get('country', 'ZAM').upper()
+    signal.set('country', _COUNTRIES.get(country, country))
+    signal.set('subtype', signal.get('subtype', '-1'))
+    if signal.get('orientation') not in ('+', '-', 'none'):
+        signal.set('orientation', 'none')
+    if not _is_float(signal.get('value', '-1')):
+        del signal.attrib['value']
+    if signal.get('dynamic') == 'yes':
+        # Its country means nothing to the converter.
+        signal.set('country', 'ZAM')
+        return signal.get('type') is not None
+    signal.set('dynamic', 'no')
+    return country in _KNOWN and signal.get('type') not in (None, '', 'none', '-1')
+
+
+def _is_float(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _remove(elements: Iterable[etree._Element]) -> None:
+    for element in elements:
+        element.getparent().remove(element)
