@@ -10,6 +10,11 @@ from crgame_ros.geometry.shape import Shape
 import numpy as np
 from numpy.typing import NDArray
 
+# CommonRoad is planar: these heights [m] serve views from the side, and boxes that need one.
+HEIGHTS = {'pedestrian': 1.75, 'bicycle': 1.7, 'motorcycle': 1.5, 'truck': 3.5, 'bus': 3.2,
+           'train': 3.8, 'building': 6.0}
+HEIGHT = 1.5
+
 
 class Role(Enum):
     """The part of the program that moves an object."""
@@ -52,6 +57,11 @@ class ObjectDescription:
     def reference_point(self) -> str:
         """Return the reference point of the object's poses: rear_axle or center."""
         return 'rear_axle' if self.role.is_ego else 'center'
+
+    @property
+    def height(self) -> float:
+        """Return the height that is usual for the type [m]."""
+        return HEIGHTS.get(self.type, HEIGHT)
 
 
 def whole_id(object_id: str) -> str:

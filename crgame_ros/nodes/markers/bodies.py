@@ -56,7 +56,7 @@ class Body(Item):
     """
 
     def __init__(self, header: Header, number: int, item: ObjectDescription) -> None:
-        height = style.body_height(item)
+        height = item.height
         self._half_height = 0.5 * height
         self._rear_to_center = item.rear_to_center
         namespace = 'vehicles' if item.role.is_ego else 'objects'

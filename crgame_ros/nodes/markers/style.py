@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Colours that the colour-blind can distinguish, heights, and a blank marker."""
+"""Colours that the colour-blind can distinguish, and a blank marker."""
 
 from collections.abc import Iterable
 
@@ -23,10 +23,6 @@ LIGHT_COLOURS = {'red': VERMILLION, 'redYellow': ORANGE, 'yellow': YELLOW, 'gree
                  'inactive': DARK_GREY}
 SOFT_TYPES = frozenset({'pedestrian', 'bicycle'})
 MOTOR_TYPES = frozenset({'car', 'truck', 'bus', 'motorcycle', 'taxi', 'priorityVehicle'})
-# CommonRoad is planar: these heights [m] only serve views from the side.
-HEIGHTS = {'pedestrian': 1.75, 'bicycle': 1.7, 'motorcycle': 1.5, 'truck': 3.5, 'bus': 3.2,
-           'train': 3.8, 'building': 6.0}
-HEIGHT = 1.5
 
 
 def colour(code: str, alpha: float = 1.0) -> ColorRGBA:
@@ -38,11 +34,6 @@ def colour(code: str, alpha: float = 1.0) -> ColorRGBA:
 def body_colour(item: ObjectDescription) -> str:
     """Return the colour of an object; people outside cars stand out."""
     return PURPLE if item.type in SOFT_TYPES else ROLE_COLOURS[item.role]
-
-
-def body_height(item: ObjectDescription) -> float:
-    """Return the height of an object's box [m]."""
-    return HEIGHTS.get(item.type, HEIGHT)
 
 
 def blank(header: Header, namespace: str, number: int, kind: int, paint: ColorRGBA,
