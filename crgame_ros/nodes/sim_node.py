@@ -89,8 +89,9 @@ class SimNode(Node):
             run.destroy()
             if outcome is not Outcome.RESET:
                 return
-            self._control.reset_wanted = False
-            before, setup = setup, self._next_setup(setup)
+            before = setup
+            setup, problem = self._next_setup(setup)
+            self._control.end_reset(problem)
             again = simulation.n > 0 and setup.game == before.game \
                 and not self._control.chosen_anew and self._all_sit(setup)
             self._control.chosen_anew = False
@@ -104,13 +105,13 @@ class SimNode(Node):
         return all(human.id in tenants and tenants[human.id].here
                    for human in setup.humans if human.driver == COCKPIT)
 
-    def _next_setup(self, present: Setup) -> Setup:
-        """Load the game that the parameters name; keep the present one if it is unusable."""
+    def _next_setup(self, present: Setup) -> tuple[Setup, str | None]:
+        """Load the game that the parameters name; if it is unusable, the present one and why."""
         try:
-            return self._announce(build_setup(self._control.next_game(present.game)))
+            return self._announce(build_setup(self._control.next_game(present.game))), None
         except CrgameError as error:
             self.get_logger().error(f'{error}; the present game starts again')
-            return present
+            return present, str(error)
 
     def _announce(self, setup: Setup) -> Setup:
         self._recorded = self._read_recordings(setup)

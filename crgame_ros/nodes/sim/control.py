@@ -3,8 +3,9 @@
 """The services and parameters that control sim_node."""
 
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -32,6 +33,23 @@ COUNTDOWN_S = 3.0
 OVER = 'the run is over: reset begins it anew'
 
 
+@dataclass(eq=False)
+class StepOrder:
+    """
+    An order of steps during a pause.
+
+    :param steps: simulation steps; None for a scenario step, however many these are.
+    :param tell: called after each simulation step with the number done so far; None for nobody.
+    :ivar done: gets the step n at which the last one is done; None if they will not be done.
+    :ivar count: simulation steps done so far.
+    """
+
+    steps: int | None
+    tell: Callable[[int], object] | None = None
+    done: Future = field(default_factory=Future)
+    count: int = 0
+
+
 class SimControl:
     """
     The orders to the simulation, as flags that its loop reads between cycles.
@@ -44,14 +62,17 @@ class SimControl:
         # Names this process in /scenario/game, so that a recorder knows whether it goes on.
         self.simulation = uuid4().hex
         self.paused = False
+        # Whether the pause was ordered, so that it is not that of a run that waits for its start.
+        self.pause_ordered = False
         # Whether the run has begun: before that, an order of a step waits for participants.
         self.begun = False
-        # The scenario steps ordered during a pause, each with the answer that is given when it is
-        # done (None: given before), and the simulation steps of the first that are done.
-        self._steps: deque[Future | None] = deque()
-        self._stepped = 0
+        self._steps: deque[StepOrder] = deque()
         self.reset_wanted = False
+        # Each gets why the game could not be used, or None, when the ordered reset is done.
+        self._resets: list[Future] = []
         self.stop_wanted = False
+        # Whether the node has to end with the run.
+        self.quit_wanted = False
         # The run has ended, and the node stays for another one.
         self.over = False
         # Whether a game or scenario has been chosen since the start.
@@ -168,6 +189,8 @@ class SimControl:
     def stays(self) -> bool:
         """Return whether the node stays when a run has ended."""
         at_end = self._value('at_end')
+        if self.quit_wanted:
+            return False
         return at_end == STAY or (at_end == STAY_IF_CHOSEN and self.chosen_later)
 
     @property
@@ -180,30 +203,94 @@ class SimControl:
         """Return whether the run is paused and no step of it is ordered."""
         return self.paused and not self._steps
 
+    def order_steps(self, steps: int | None,
+                    tell: Callable[[int], object] | None = None) -> StepOrder:
+        """Order steps during a pause; see `StepOrder`."""
+        order = StepOrder(steps, tell)
+        self._steps.append(order)
+        return order
+
+    def withdraw(self, order: StepOrder) -> None:
+        """Answer an order of steps that shall not go on."""
+        with suppress(ValueError):
+            self._steps.remove(order)
+            order.done.set_result(None)
+
     def count_step(self, steps_per_tick: int, n: int) -> None:
         """
-        Count down the scenario steps ordered during a pause, each of `steps_per_tick` steps.
+        Count down the steps ordered during a pause.
 
+        :param steps_per_tick: simulation steps of a scenario step.
         :param n: the simulation step that has been done.
         """
         if not (self.paused and self._steps):
             self.end_steps()
             return
-        self._stepped += 1
-        if self._stepped == steps_per_tick:
-            self._end_step(n)
+        order = self._steps[0]
+        order.count += 1
+        if order.tell is not None:
+            order.tell(order.count)
+        if order.count >= (steps_per_tick if order.steps is None else order.steps):
+            self._steps.popleft().done.set_result(n)
 
     def end_steps(self) -> None:
         """Answer the orders of steps that will not be done as such."""
         while self._steps:
-            self._end_step(None)
+            self._steps.popleft().done.set_result(None)
 
-    def _end_step(self, n: int | None) -> None:
-        """Answer the first order of a step; n: None if it was not done."""
-        self._stepped = 0
-        done = self._steps.popleft()
-        if done is not None:
-            done.set_result(n)
+    def start(self) -> None:
+        """Let the run begin, or go on."""
+        self.paused, self.pause_ordered, self.started = False, False, True
+
+    def pause(self) -> None:
+        """Let everything stand still after the present step."""
+        self.paused = self.pause_ordered = True
+
+    def hold(self) -> None:
+        """Let the run stand at its first step until it is started: a begun one needs a reset."""
+        self.paused, self.pause_ordered, self.started = True, False, False
+
+    def reset(self) -> Future:
+        """
+        Begin the run anew.
+
+        :return: gets why the chosen game could not be used, or None, once the run is there.
+        """
+        self.reset_wanted, self.started = True, False
+        self._resets.append(Future())
+        return self._resets[-1]
+
+    def end_reset(self, problem: str | None) -> None:
+        """Answer the orders of a reset; problem: why the chosen game could not be used."""
+        self.reset_wanted = False
+        for done in self._resets:
+            done.set_result(problem)
+        self._resets.clear()
+
+    def stop(self) -> None:
+        """End the run."""
+        self.stop_wanted = True
+
+    def shut_down(self) -> None:
+        """End the run, and the node with it."""
+        self.stop_wanted = self.quit_wanted = True
+
+    @property
+    def choice(self) -> tuple[str, str]:
+        """Return what is loaded at a reset: game or scenario, and its name."""
+        return self._chosen, self._value(self._chosen)
+
+    def choose(self, kind: str, name: str) -> str:
+        """
+        Choose what is loaded at a reset, by the parameter that names it.
+
+        :param kind: game or scenario.
+        :return: why this is refused; empty if it is not.
+        """
+        answer, = self._node.set_parameters([Parameter(kind, value=name)])
+        if answer.successful:
+            self._chosen = kind
+        return str(answer.reason)
 
     def first_game(self) -> Game:
         """
@@ -278,14 +365,14 @@ class SimControl:
     def _on_start(self, _: Any, response: object) -> object:
         if self.over:
             return _answer(response, False, OVER)
-        self.paused, self.started = False, True
+        self.start()
         return _answer(response, True, f'waiting for the driver of {" and ".join(self.awaited)}'
                        if self.awaited else 'running')
 
     def _on_pause(self, _: object, response: object) -> object:
         if self.over:
             return _answer(response, False, OVER)
-        self.paused = True
+        self.pause()
         return _answer(response, True, 'paused')
 
     async def _on_step(self, _: object, response: object) -> object:
@@ -293,23 +380,21 @@ class SimControl:
             return _answer(response, False, OVER)
         if not self.paused:
             return _answer(response, False, 'not paused: call /sim/pause first')
+        order = self.order_steps(None)
         if not self.begun:
-            self._steps.append(None)
             return _answer(response, True, 'once the run begins')
-        done = Future()
-        self._steps.append(done)
-        n = await done
+        n = await order.done
         return _answer(response, n is not None, f'at n = {n}' if n is not None else
                        'not done: the run goes on or is over')
 
     def _on_reset(self, _: object, response: object) -> object:
-        self.reset_wanted, self.started = True, False
+        self.reset()
         return _answer(response, True, 'resetting')
 
     def _on_stop(self, _: object, response: object) -> object:
         if self.over:
             return _answer(response, False, OVER)
-        self.stop_wanted = True
+        self.stop()
         return _answer(response, True, 'stopping')
 
 

@@ -199,13 +199,13 @@ class LiveRun:
         control = self._control
         control.over, control.stop_wanted = True, False
         self._state.stand()
-        while not (self._stop.requested or control.reset_wanted):
+        while not (self._stop.requested or control.reset_wanted or control.quit_wanted):
             self._state.publish('ended', self._reason)
             self._serve(0.02)
             self._state.show_newcomers()
             self._apply_orders(time.monotonic_ns())
         control.over = False
-        return Outcome.STOPPED if self._stop.requested else Outcome.RESET
+        return Outcome.STOPPED if self._stop.requested or control.quit_wanted else Outcome.RESET
 
     def destroy(self) -> None:
         """Release the endpoints."""
