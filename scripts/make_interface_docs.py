@@ -3,11 +3,11 @@
 """Write docs/interfaces.md, the tables of the contract, from msg_defs/interfaces.yaml."""
 
 import argparse
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 import re
 
-from crgame_ros.messages.contract import Contract, load_contract, Qos, Topic
+from crgame_ros.messages.contract import Contract, load_contract, Qos, Service, Topic
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / 'msg_defs' / 'interfaces.yaml'
@@ -27,7 +27,8 @@ def document(source: Path = SOURCE) -> str:
     parts = ['# Interfaces', NOTICE, *general, '## Vehicles and objects in a JointTrajectory',
              *trajectories, '## Topics', _overview(contract)]
     parts += [_details(topic) for topic in contract.topics.values()]
-    parts += ['## Services', 'All are offered by `sim_node`.', _services(contract),
+    parts += ['## Services', 'All are offered by `sim_node`.', _services(contract.services),
+              '## Actions', 'All are offered by `sim_node`.', _services(contract.actions),
               '## Parameters', 'These may be set while the node runs.',
               _parameters(contract)]
     return '\n\n'.join(parts) + '\n'
@@ -67,10 +68,10 @@ def _details(topic: Topic) -> str:
     return f'### {_code(topic.name)}\n\n' + _table(('field', 'meaning'), rows)
 
 
-def _services(contract: Contract) -> str:
-    return _table(('service', 'type', 'what it does'), (
+def _services(services: Mapping[str, Service]) -> str:
+    return _table(('name', 'type', 'what it does'), (
         (_code(service.name), _code(service.type_name), _escaped(service.what))
-        for service in contract.services.values()))
+        for service in services.values()))
 
 
 def _parameters(contract: Contract) -> str:

@@ -52,11 +52,11 @@ OF_PLANNERS = {'commonroad_idm_planner': 'commonroad-idm-planner',
 # Dask's configuration comes with its scheduler.
 OF_EXTRAS = {'dask'}
 # Of ROS: each is a package of its own in package.xml; from pip they come together.
-ROS = re.compile(r'\w+_msgs|std_srvs|builtin_interfaces|rcl_interfaces|rclpy|launch')
+ROS = re.compile(r'\w+_msgs|std_srvs|\w+_interfaces|rclpy|launch')
 ROS_FROM_PIP = {'ros-jazzy-common-interfaces', 'ros-jazzy-rclpy'}
 # For the launch file alone, which starts the launcher of run.sh.
 ROS_OF_LAUNCH = {'launch', 'ros2launch'}
-NOT_IN_WHEELS = {'tf2_msgs'}
+NOT_IN_WHEELS = {'simulation_interfaces', 'tf2_msgs'}
 
 
 def _imported() -> Iterator[str]:

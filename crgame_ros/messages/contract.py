@@ -61,7 +61,7 @@ class Topic:
     @property
     def available(self) -> bool:
         """Return whether the topic is available; only an optional one may not be."""
-        return not self.optional or find_spec(self.type_name.partition('/')[0]) is not None
+        return not self.optional or _is_installed(self.type_name)
 
     @property
     def is_own(self) -> bool:
@@ -90,14 +90,21 @@ class Topic:
 @dataclass(frozen=True)
 class Service:
     """
-    One service of the contract, offered by sim_node.
+    One service or action of the contract, offered by sim_node.
 
     :param name: with a placeholder <av> for an AV's id, if each AV has one.
+    :param optional: whether it is left out where its type's package is not installed.
     """
 
     name: str
     type_name: str
     what: str
+    optional: bool
+
+    @property
+    def available(self) -> bool:
+        """Return whether it is available; only an optional one may not be."""
+        return not self.optional or _is_installed(self.type_name)
 
     def names(self, avs: Sequence[str]) -> tuple[str, ...]:
         """Return the service's names in a run with these AVs."""
@@ -112,6 +119,7 @@ class Contract:
 
     topics: Mapping[str, Topic]
     services: Mapping[str, Service]
+    actions: Mapping[str, Service]
     parameters: Mapping[str, Mapping[str, Mapping[str, str]]]
 
     def topic(self, name: str) -> Topic:
@@ -128,18 +136,26 @@ def load_contract(path: Path | None = None) -> Contract:
     """
     path = share_directory() / 'msg_defs' / 'interfaces.yaml' if path is None else path
     content = read_yaml(path, 'contract')
-    topics, services, profiles = {}, {}, {}
+    topics, profiles = {}, {}
+    services: dict[str, Service] = {}
+    actions: dict[str, Service] = {}
     name = 'qos'
     try:
         for name, row in content['qos'].items():
             profiles[name] = Qos(**row)
         for name, row in content['topics'].items():
             topics[name] = _topic(name, row, profiles, content['max_bytes'])
-        for name, row in content['services'].items():
-            services[name] = Service(name, row['type'], row['what'])
+        for section, found in (('services', services), ('actions', actions)):
+            for name, row in content[section].items():
+                found[name] = Service(name, row['type'], row['what'],
+                                      bool(row.get('optional', False)))
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f'{error} is missing or wrong', f'{path}: {name}') from error
-    return Contract(topics, services, content['parameters'])
+    return Contract(topics, services, actions, content['parameters'])
+
+
+def _is_installed(type_name: str) -> bool:
+    return find_spec(type_name.partition('/')[0]) is not None
 
 
 def _topic(name: str, row: Mapping[str, Any], profiles: Mapping[str, Qos],

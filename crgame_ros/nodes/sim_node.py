@@ -15,6 +15,7 @@ from crgame_ros.game.game import Game
 from crgame_ros.nodes.sim.control import SimControl
 from crgame_ros.nodes.sim.live_run import LiveRun
 from crgame_ros.nodes.sim.run_state import Outcome
+from crgame_ros.nodes.sim.simulation_interfaces import offer_simulation_interfaces
 from crgame_ros.recording.run_folder import run_folder
 from crgame_ros.ros.namespace_lock import hold_namespace
 from crgame_ros.ros.node_main import run_node, StopFlag
@@ -43,6 +44,7 @@ class SimNode(Node):
     def __init__(self) -> None:
         super().__init__('sim_node')
         self._control = SimControl(self)
+        self._interfaces = offer_simulation_interfaces(self, self._control)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self)
         self._recorded: RecordedInputs | None = None
@@ -77,8 +79,10 @@ class SimNode(Node):
                     item.driver == COCKPIT for item in setup.humans)
             run = LiveRun(self, self._executor, self._control, setup, epoch, offset_ns,
                           self._recorded)
-            outcome = run.run(stop)
             simulation = run.simulation
+            if self._interfaces is not None:
+                self._interfaces.show(simulation)
+            outcome = run.run(stop)
             now_ns = simulation.scheduler.stamp_ns(simulation.n)
             self.get_logger().info(
                 f'{outcome.name.lower()} at {(now_ns - offset_ns) / NS_PER_S:.2f} s '

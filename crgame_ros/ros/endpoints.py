@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Publishers, subscriptions and services, created from the interface contract."""
+"""Publishers, subscriptions, services and actions, created from the interface contract."""
 
 from collections.abc import Callable, Mapping
 import time
-from typing import Any
+from typing import Any, TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 from crgame_ros.errors import InputError
@@ -22,6 +22,9 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.service import Service
 from rclpy.subscription import Subscription
+
+if TYPE_CHECKING:  # Only where a standard package for actions is installed.
+    from rclpy.action import ActionServer
 
 PERIOD_S = 1.0
 # Unusable messages, and those for other nodes, are skipped: at most this many per read.
@@ -211,6 +214,20 @@ class Endpoints:
         return self._node.create_service(
             message_type(row.type_name), relative(name.replace('<av>', vehicle_id)), callback,
             qos_profile=QoSProfile(depth=SERVICE_DEPTH), callback_group=group)
+
+    def action(self, name: str, execute: Callable[[Any], object],
+               cancel: Callable[[Any], bool], group: CallbackGroup) -> 'ActionServer':
+        """
+        Create an action, of which the owner must keep what is returned.
+
+        :param execute: returns the result of a goal.
+        :param cancel: returns whether a goal shall be cancelled.
+        """
+        from rclpy.action import ActionServer, CancelResponse
+        return ActionServer(
+            self._node, message_type(self._contract.actions[name].type_name), relative(name),
+            execute, callback_group=group, cancel_callback=lambda goal:
+            CancelResponse.ACCEPT if cancel(goal) else CancelResponse.REJECT)
 
     def client(self, name: str, vehicle_id: str = '') -> Client:
         """Create a client of a service."""

@@ -57,7 +57,7 @@ def test_the_contract_is_whole() -> None:
     """Each essential topic has a row, under its usual name."""
     assert {'/clock', '/scenario/xml', '/vehicles/state', '/<av>/plan_request', '/<av>/plan',
             '/<v>/driver_command', '/timing/cycle', '/diagnostics'} <= set(CONTRACT.topics)
-    assert set(CONTRACT.services) == {
+    assert {service.name for service in CONTRACT.services.values() if not service.optional} == {
         *(f'/sim/{name}' for name in ('start', 'pause', 'step', 'reset', 'stop')),
         '/<av>/planner_run'}
 
@@ -129,10 +129,16 @@ def test_placeholders_stand_for_the_vehicles_of_a_kind() -> None:
 
 def test_services_and_parameters_name_what_exists() -> None:
     """Service types can be called; parameters belong to nodes and have a type and a meaning."""
-    for service in CONTRACT.services.values():
-        kind = message_type(service.type_name)
-        assert hasattr(kind, 'Request') and hasattr(kind, 'Response')
+    for service in (*CONTRACT.services.values(), *CONTRACT.actions.values()):
         assert NAME.fullmatch(service.name) and service.what
+        package, kind, name = service.type_name.split('/')
+        if service.optional:
+            # The standard's names are those of the types.
+            assert package == 'simulation_interfaces'
+            assert re.sub('([A-Z])', r'_\1', name).lower() == service.name.replace('/', '_')
+        if service.available:
+            parts = ('Goal', 'Result', 'Feedback') if kind == 'action' else ('Request', 'Response')
+            assert all(hasattr(message_type(service.type_name), part) for part in parts)
     assert set(CONTRACT.parameters) <= NODES
     for rows in CONTRACT.parameters.values():
         for row in rows.values():
@@ -174,7 +180,7 @@ def test_page_has_every_row(project_root: Path) -> None:
         section = lines[lines.index(f'### `{topic.name}`'):]
         for field in topic.fields:
             assert any(line.startswith(f'| `{field}` |') for line in section)
-    for name in (*CONTRACT.services, *CONTRACT.parameters['sim_node']):
+    for name in (*CONTRACT.services, *CONTRACT.actions, *CONTRACT.parameters['sim_node']):
         assert sum(f'| `{name}` |' in line for line in lines) == 1
 
 

@@ -254,6 +254,13 @@ def test_publishers_are_the_declared_producers(graph: Graph) -> None:
     """Topic, node, type and QoS of every publisher: all that is declared, nothing else."""
     expected = {item for topic in load_contract().topics.values() if topic.available
                 for item in graph.case.publishers(topic)}
+    for action in load_contract().actions.values():
+        if action.available:
+            place = f'{action.name}/_action'
+            expected |= {(f'{place}/feedback', 'sim_node', f'{action.type_name}_FeedbackMessage',
+                          'reliable', 'volatile'),
+                         (f'{place}/status', 'sim_node', 'action_msgs/msg/GoalStatusArray',
+                          'reliable', 'transient_local')}
     assert len(expected) > 20
     _compare(_settled(graph.publishers, expected), expected)
 
@@ -267,10 +274,16 @@ def test_subscriptions_are_the_declared_consumers(graph: Graph) -> None:
 
 
 def test_services_are_the_declared_ones(graph: Graph) -> None:
-    """`sim_node` alone offers services beside those that every node has."""
+    """`sim_node` alone offers services beside those that every node has, and of actions."""
+    contract = load_contract()
     expected = {('sim_node', name, service.type_name)
-                for service in load_contract().services.values()
+                for service in contract.services.values() if service.available
                 for name in service.names(graph.case.avs)}
+    expected |= {('sim_node', f'{action.name}/_action/{part}', kind)
+                 for action in contract.actions.values() if action.available
+                 for part, kind in (('send_goal', f'{action.type_name}_SendGoal'),
+                                    ('get_result', f'{action.type_name}_GetResult'),
+                                    ('cancel_goal', 'action_msgs/srv/CancelGoal'))}
     _compare(_settled(graph.services, expected), expected)
 
 
