@@ -32,7 +32,7 @@ class _Tool(NamedTuple):
 
 
 RUN, OFFLINE = 'run a game live, as ./run.sh does', 'run a game as fast as it can, without ROS'
-CONVERT = 'turn a recording into a CommonRoad scenario'
+CONVERT = 'turn a recording into a CommonRoad or OpenSCENARIO file'
 RECOVER, INFO = 'finish a recording whose recorder was killed', 'what is in a recording'
 RECORDING = 'folder of a run, or its recording: a folder or file'
 DOCTOR = 'what is missing on this machine, and the remedy'
@@ -129,8 +129,12 @@ def _build_parser(chosen: str) -> argparse.ArgumentParser:
     convert = commands.add_parser('convert', help=CONVERT)
     convert.add_argument('bag', type=_recording, help=RECORDING)
     convert.add_argument('--out', type=Path, metavar='PATH',
-                         help='file to write (*.xml), or folder for <benchmark id>.xml (default: '
-                         'beside the recording)')
+                         help='file to write (*.xml: CommonRoad, *.xosc: OpenSCENARIO), or folder '
+                         'for <benchmark id>.xml or .xosc (default: beside the recording)')
+    convert.add_argument('--format', choices=('commonroad', 'openscenario'),
+                         help='where --out names no file (default: commonroad)')
+    convert.add_argument('--road', type=Path, metavar='FILE',
+                         help='OpenDRIVE file of the roads, for OpenSCENARIO')
     convert.add_argument('--epoch', type=int, help='which run of a recording that holds several '
                          '(resets count them from 0; default: the last)')
     convert.set_defaults(command=_convert)
@@ -169,7 +173,8 @@ def _add_offline(parser: argparse.ArgumentParser) -> None:
     add('--trigger', type=_trigger, action='append', default=[], metavar='NAME@S',
         help='trigger an event of the game so many seconds after the start; may be repeated')
     add('--out', type=Path, metavar='PATH',
-        help='write the run as a CommonRoad scenario: a file (*.xml) or a folder')
+        help='write the run as a CommonRoad scenario: a file (*.xml) or a folder; or as '
+        'OpenSCENARIO: a file (*.xosc)')
     parser.set_defaults(command=_offline)
 
 
@@ -224,16 +229,25 @@ def _offline(values: argparse.Namespace) -> int:
 
 
 def _convert(values: argparse.Namespace) -> int:
-    from crgame_ros.recording.conversion import convert
+    from crgame_ros.recording.conversion import convert, convert_to_openscenario
     from crgame_ros.recording.export import prepare_folder
     from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.run_formats import chosen_format, OPENSCENARIO
+    ending = chosen_format(values.out, values.format)
+    if values.road is not None and ending != OPENSCENARIO:
+        raise InputError('is for OpenSCENARIO', '--road', 'give --format openscenario as well')
     if values.out is not None:
         prepare_folder(values.out)
-    report = convert(values.bag, values.out, values.epoch,
-                     Progress(partial(print, file=sys.stderr), f'reading {values.bag}'))
-    for notice in report.notices:
+    progress = Progress(partial(print, file=sys.stderr), f'reading {values.bag}')
+    if ending == OPENSCENARIO:
+        path, notices = convert_to_openscenario(values.bag, values.out, values.epoch, progress,
+                                                values.road)
+    else:
+        report = convert(values.bag, values.out, values.epoch, progress)
+        path, notices = report.path, report.notices
+    for notice in notices:
         print(f'note: {notice}')
-    print(report.path)
+    print(path)
     return 0
 
 

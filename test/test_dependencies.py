@@ -45,7 +45,8 @@ THIRD_PARTY = {
     'zstandard': ('zstandard', None),
 }
 # Packages of extras, chosen by the user; no other part of the package imports them.
-EXTRAS = {'evaluate': {'cryptography', 'dask', 'distributed'}, 'gym': {'gymnasium', 'pettingzoo'}}
+EXTRAS = {'evaluate': {'cryptography', 'dask', 'distributed'}, 'gym': {'gymnasium', 'pettingzoo'},
+          'openscenario': {'scenariogeneration'}}
 # Of requirements-planners.txt, by imported name.
 OF_PLANNERS = {'commonroad_idm_planner': 'commonroad-idm-planner',
                'commonroad_rp': 'commonroad-reactive-planner'}

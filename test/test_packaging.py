@@ -496,7 +496,7 @@ def test_crgame_runs_from_a_clone(tmp_path: Path) -> None:
     code = f'cd "{tmp_path}"; '
     for command in (f'"{tree}/crgame"', './link', 'crgame'):
         done = _source(tree, f'{code}{command} --help && {command} info no_such_bag')
-        assert re.search('convert +turn a recording into a CommonRoad scenario', done.stdout), done
+        assert re.search('convert +turn a recording into a CommonRoad', done.stdout), done
         assert (done.returncode, done.stderr) == (
             2, 'error: no_such_bag: no such file or folder; give a recording\n'), command
 

@@ -133,9 +133,10 @@ class Run(MeasuredRun):
 
     def save_scenario(self, path: FileName) -> Path:
         """
-        Write the run as a CommonRoad scenario; warn about parts that it cannot express.
+        Write the run as a CommonRoad scenario or as OpenSCENARIO; warn about parts left out.
 
-        :param path: file (`*.xml`), or folder for `<benchmark id>.xml`.
+        :param path: file (`*.xml`, or `*.xosc` for OpenSCENARIO), or folder for
+            `<benchmark id>.xml`.
         :return: the file.
         :raises InputError: if it cannot be written, or an existing file is not an exported run.
         """

@@ -16,6 +16,7 @@ from crgame_ros.planner.registry import PLANNERS
 from crgame_ros.python_interface.finished_run import Run
 from crgame_ros.python_interface.games import argument_names, as_game, FileName
 from crgame_ros.python_interface.own_planners import name_planners, PlannerLike
+from crgame_ros.recording.conversion import write_openscenario
 from crgame_ros.recording.export import scenario_path, write_scenario
 from crgame_ros.recording.progress import Progress
 from crgame_ros.recording.recorded_inputs import (
@@ -24,6 +25,7 @@ from crgame_ros.recording.recorded_inputs import (
     RecordedInputs,
     with_recorded_events,
 )
+from crgame_ros.recording.run_formats import OPENSCENARIO
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import Setup
@@ -108,6 +110,8 @@ class OfflineRun(Run):
 
     def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
         """Write the scenario; return its file, and the parts that it does not express."""
+        if out.suffix == OPENSCENARIO:
+            return write_openscenario(self.log, out)
         found = write_scenario(self.log, out)
         return scenario_path(out, found.benchmark_id), found.notices
 

@@ -10,10 +10,11 @@ from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup
 from crgame_ros.python_interface.finished_run import Run
 from crgame_ros.python_interface.games import as_path, FileName
-from crgame_ros.recording.conversion import convert_log
+from crgame_ros.recording.conversion import convert_log, day_of, write_openscenario
 from crgame_ros.recording.recorded_game import read_game_document
 from crgame_ros.recording.recorded_states import recorded_states
 from crgame_ros.recording.run_folder import recording_in, run_name
+from crgame_ros.recording.run_formats import OPENSCENARIO
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
 from crgame_ros.simulation.setup import Setup
 import numpy as np
@@ -53,6 +54,8 @@ class RecordedRun(Run):
 
     def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
         """Write the scenario; return its file, and the parts that it does not express."""
+        if out.suffix == OPENSCENARIO:
+            return write_openscenario(self.log, out, day=day_of(self._bag))
         found = convert_log(self.log, self._bag, out)
         return found.path, found.notices
 

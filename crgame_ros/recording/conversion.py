@@ -1,17 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Converts a recording to a CommonRoad scenario file."""
+"""Converts a recording to a file of another format: CommonRoad or OpenSCENARIO."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import date, datetime, UTC
+import os
 from pathlib import Path
 
-from crgame_ros.recording.epochs import epoch_numbers
+from crgame_ros.errors import InputError
+from crgame_ros.recording.epochs import epoch_numbers, XML_TOPIC
 from crgame_ros.recording.exceptions import RunTooShortError
 from crgame_ros.recording.export import export_scenario, scenario_path
 from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_formats import OPENSCENARIO, require_openscenario
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
+from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.whole_file import write_text
 
 
@@ -63,11 +67,54 @@ def convert_log(log: RunTrajectories, bag: Path, out: Path | None = None) -> Con
 
     :param log: the run.
     """
-    exported = export_scenario(log, day=_day_of(bag))
+    exported = export_scenario(log, day=day_of(bag))
     path = scenario_path(bag.resolve().parent if out is None else out, exported.benchmark_id)
     write_text(exported.xml_text, path)
     return ConversionReport(path, exported.benchmark_id, int(log.ks[0]), len(log.ks),
                             exported.obstacle_ids, exported.problem_ids, exported.notices)
+
+
+def convert_to_openscenario(bag: Path, out: Path | None = None, epoch: int | None = None,
+                            progress: Callable[[float], object] | None = None,
+                            road: Path | None = None) -> tuple[Path, tuple[str, ...]]:
+    """
+    Write a recorded run as OpenSCENARIO; parameters and errors as for `convert`.
+
+    :param out: the file (`*.xosc`) or the folder for `<benchmark id>.xosc`, as above.
+    :param road: an OpenDRIVE file of its roads.
+    :return: the file, and the parts that it does not express, one line each.
+    :raises InputError: also if the library for it is not installed.
+    """
+    _check_road(road)
+    require_openscenario()
+    log = (read_last_run(bag, progress) if epoch is None
+           else read_trajectories(bag, epoch, progress))
+    return write_openscenario(log, bag.resolve().parent if out is None else out,
+                              day=day_of(bag), road=road)
+
+
+def write_openscenario(log: RunTrajectories, out: Path, *, day: date | None = None,
+                       road: Path | None = None) -> tuple[Path, tuple[str, ...]]:
+    """
+    Write a run as OpenSCENARIO, completely or not at all.
+
+    :param out: the file (`*.xosc`) or the folder for `<benchmark id>.xosc`.
+    :param day: date of the run; that of the original if None.
+    :param road: an OpenDRIVE file of its roads, which the file names relative to its own folder.
+    :return: the file, and the parts that it does not express, one line each.
+    :raises InputError: if the library for it is not installed, the run has no step, or the file
+        cannot be written.
+    :raises CrgameError: if the result violates the schema; nothing is written then.
+    """
+    _check_road(road)
+    require_openscenario()
+    from crgame_ros.recording.openscenario import export_openscenario
+    name = log.game.benchmark_id or parse_scenario(log.xml_text, XML_TOPIC).benchmark_id
+    path = scenario_path(out, name, OPENSCENARIO)
+    exported = export_openscenario(log, name, day=day, road=None if road is None else Path(
+        os.path.relpath(road.resolve(), path.parent.resolve())).as_posix())
+    write_text(exported.xml_text, path)
+    return path, exported.notices
 
 
 def read_last_run(bag: Path, progress: Callable[[float], object] | None = None) -> RunTrajectories:
@@ -95,6 +142,12 @@ def read_last_run(bag: Path, progress: Callable[[float], object] | None = None) 
     raise refusal
 
 
-def _day_of(bag: Path) -> date:
+def _check_road(road: Path | None) -> None:
+    if road is not None and not road.is_file():
+        raise InputError('there is no such file', str(road), 'name an OpenDRIVE file')
+
+
+def day_of(bag: Path) -> date:
+    """Return the day on which a recording began, in UTC."""
     with BagReader(bag) as reader:
         return datetime.fromtimestamp(reader.start_ns * 1e-9, UTC).date()

@@ -17,6 +17,12 @@ from crgame_ros.game.objects import Role
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.paths import check_room
 from crgame_ros.recording.export_objects import named, ObjectWriter
+from crgame_ros.recording.run_formats import (
+    COMMONROAD,
+    FORMATS,
+    OPENSCENARIO,
+    require_openscenario,
+)
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.exact_values import exact_value
@@ -213,14 +219,14 @@ def write_scenario(log: RunTrajectories, out: Path, **header: Any) -> ExportedSc
     return exported
 
 
-def scenario_path(out: Path, benchmark_id: str) -> Path:
+def scenario_path(out: Path, benchmark_id: str, ending: str = COMMONROAD) -> Path:
     """
     Return the file to write; only an earlier export may be replaced.
 
-    :param out: as for `write_scenario`.
+    :param out: the file with this ending, or the folder for `<benchmark id><ending>`.
     :raises InputError: if a file that is not an export has that name.
     """
-    path = out if out.suffix == '.xml' else out / f'{benchmark_id}.xml'
+    path = out if out.suffix == ending else out / f'{benchmark_id}{ending}'
     try:
         with path.open('rb') as stream:
             replaceable = SOURCE_MARK.encode() in stream.read(_HEAD_BYTES)
@@ -239,13 +245,16 @@ def prepare_folder(out: Path) -> None:
     """
     Create the folder of a file that is written later, and check that the folder is writable.
 
-    :param out: as for `write_scenario`.
-    :raises InputError: if it is not.
+    :param out: the file, in one of the formats of a run, or the folder.
+    :raises InputError: if it is not, or the format needs a library that is not installed.
     """
-    folder = out.parent if out.suffix == '.xml' else out
-    if out.suffix == '.xml' and out.exists():
+    is_file = out.suffix in FORMATS.values()
+    folder = out.parent if is_file else out
+    if out.suffix == OPENSCENARIO:
+        require_openscenario()
+    if is_file and out.exists():
         # Refuse a bad path now, not after the run.
-        scenario_path(out, '')
+        scenario_path(out, '', out.suffix)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK | os.X_OK):

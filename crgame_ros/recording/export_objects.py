@@ -8,7 +8,6 @@ from xml.sax.saxutils import escape
 
 from commonroad.prediction.prediction import SetBasedPrediction
 from commonroad.scenario.scenario import Scenario
-from crgame_ros.errors import InputError
 from crgame_ros.game.events import Release
 from crgame_ros.game.objects import ObjectDescription, Role, whole_id
 from crgame_ros.geometry.angles import wrap_pi_array
@@ -167,7 +166,7 @@ class ObjectWriter:
     def _write_moving(self, item: ObjectDescription, parts: Parts, poses: FloatArray,
                       velocities: FloatArray) -> None:
         """Write a dynamic obstacle from step 0 on, and phantom obstacles for later pieces."""
-        pieces = list(_pieces(poses))
+        pieces = list(present_pieces(poses))
         if pieces[0] == (0, 1):
             self._notices.append(f'{item.id}: where it was at time step 0 alone is left out')
             pieces.pop(0)
@@ -189,11 +188,7 @@ class ObjectWriter:
 
 
 def _vehicle_rows(log: RunTrajectories) -> FloatArray:
-    states = log.vehicle_states
-    if not np.isfinite(states).all():
-        step, column, _ = np.argwhere(~np.isfinite(states))[0].tolist()
-        raise InputError(f'its state at scenario step {log.ks[step]} holds no numbers',
-                         log.vehicles[column].id, 'record the run again')
+    states = log.finite_vehicle_states
     offset = np.array([item.rear_to_center for item in log.vehicles])
     yaw = states[:, :, StateColumn.YAW]
     rows = states[:, :, (StateColumn.X, StateColumn.Y, StateColumn.YAW, StateColumn.SPEED,
@@ -219,7 +214,7 @@ def _signed_speeds(poses: FloatArray, velocities: FloatArray) -> FloatArray:
     return np.nan_to_num(speeds)
 
 
-def _pieces(poses: FloatArray) -> Iterator[tuple[int, int]]:
+def present_pieces(poses: FloatArray) -> Iterator[tuple[int, int]]:
     """Yield first and end of each run of steps at which the object is present."""
     present = np.isfinite(poses).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], present, [False])))).tolist()

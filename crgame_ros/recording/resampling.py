@@ -45,7 +45,7 @@ def resample(states: FloatArray, ns: IntArray, intervals_s: FloatArray, dt_s: fl
     found = np.empty((len(wanted_ns), states.shape[1], states.shape[2]))
     for column in range(states.shape[1]):
         times_s = ns * dt_s + leads_s[ns, column]
-        found[:, column] = _at(states[:, column], times_s, wanted_s)
+        found[:, column] = states_at(states[:, column], times_s, wanted_s)
         unknown = (wanted_s > times_s[-1] + 1.5 * dt_s) | (wanted_s < times_s[0] - 1.5 * dt_s)
         found[unknown, column] = np.nan
     return found
@@ -82,8 +82,8 @@ def moved_intervals(table: CycleTable, vehicles: Sequence[str], humans: Collecti
     return intervals_s
 
 
-def _at(states: FloatArray, times_s: FloatArray, wanted_s: FloatArray) -> FloatArray:
-    """Interpolate one vehicle's states (S, 8) at increasing times: (K, 8)."""
+def states_at(states: FloatArray, times_s: FloatArray, wanted_s: FloatArray) -> FloatArray:
+    """Interpolate one vehicle's states (S, 8) at increasing times, as `resample`: (K, 8)."""
     after = np.clip(np.searchsorted(times_s, wanted_s), 0, len(states) - 1)
     before = np.maximum(after - 1, 0)
     first, second = states[before], states[after]

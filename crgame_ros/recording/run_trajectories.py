@@ -89,6 +89,19 @@ class RunTrajectories:
         """Return the descriptions of the M other objects."""
         return self.descriptions[self.vehicle_states.shape[1]:]
 
+    @property
+    def finite_vehicle_states(self) -> FloatArray:
+        """
+        Return `vehicle_states`.
+
+        :raises InputError: if one of them holds no numbers.
+        """
+        if not np.isfinite(self.vehicle_states).all():
+            step, column, _ = np.argwhere(~np.isfinite(self.vehicle_states))[0].tolist()
+            raise InputError(f'its state at scenario step {self.ks[step]} holds no numbers',
+                             self.vehicles[column].id, 'record the run again')
+        return self.vehicle_states
+
     def until(self, k: int) -> 'RunTrajectories':
         """Return the run up to and including a scenario step, without its cycles."""
         count = int(np.searchsorted(self.ks, k, side='right'))
