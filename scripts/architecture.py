@@ -31,8 +31,9 @@ FOLDERS = (
     'occupancy', 'scripted', 'messages', 'driver', 'timing', 'drivability', 'control',
     'planner', 'perception', 'policy', 'traffic/compiling', 'traffic/lanes', 'traffic/fleet',
     'traffic/motion', 'traffic/following', 'traffic/crossing', 'traffic/changing', 'traffic',
-    'simulation', 'recording', 'worlds', 'analysis/criticality', 'analysis/behaviour', 'analysis/scores',
-    'analysis/pictures', 'analysis/runs', 'analysis/tables', 'analysis/report', 'analysis',
+    'simulation', 'recording', 'worlds', 'analysis/criticality', 'analysis/behaviour',
+    'analysis/scores', 'analysis/pictures', 'analysis/runs', 'analysis/tables', 'analysis/report',
+    'analysis',
     'evaluation/results', 'evaluation/summary', 'evaluation', 'study', 'study/data', 'cockpit',
     'cockpit/runs', 'study/desk', 'gym', 'ros', 'nodes/sim', 'nodes/cockpit', 'nodes/markers',
     'nodes', 'launcher', 'study/conduct', 'reproduction', 'python_interface', HIGHEST)

@@ -23,7 +23,7 @@ from crgame_ros.worlds.kinds import LANELET2, OPENDRIVE, OSM, WorldKind
 from crgame_ros.worlds.lanelet2 import prepare_lanelet2
 from crgame_ros.worlds.mending import mend_map
 from crgame_ros.worlds.opendrive import prepare_opendrive
-from crgame_ros.worlds.sumo import light_cycles, LightCycle, to_opendrive
+from crgame_ros.worlds.sumo import light_cycles, LightCycle, to_opendrive, without_turns
 from lxml import etree
 
 TIME_STEP_S = 0.1
@@ -33,6 +33,7 @@ _WAY, _SPEED, _GOAL_STEPS = 400.0, 8.0, 1200
 # Its centre is so far from the beginning of its lane, if the lane is long enough [m].
 _FROM_START = 10.0
 _DECLARATION = re.compile(r'<\?xml[^>]*\?>')
+_NAMESPACE = re.compile(r'\sxmlns=("[^"]*"|\'[^\']*\')')
 _NO_WORD = re.compile('[^A-Za-z0-9]')
 _DAY = '1970-01-01'
 
@@ -92,9 +93,9 @@ def _prepared(source: Path, kind: WorldKind, folder: Path, timeout_s: float,
     if kind is OPENDRIVE:
         root = _parsed(source, 'OpenDRIVE')
     else:
-        _parsed(source, kind.root)
-        root = _parsed(to_opendrive(source.resolve(), kind is OSM, folder, timeout_s, say),
-                       'OpenDRIVE')
+        given, network = folder / 'source.xml', _parsed(source, kind.root)
+        given.write_bytes(etree.tostring(network if kind is OSM else without_turns(network)))
+        root = _parsed(to_opendrive(given, kind is OSM, folder, timeout_s, say), 'OpenDRIVE')
         cycles = light_cycles(root, _parsed(folder / 'map.net.xml', 'net'))
     return root, cycles, prepare_opendrive(root)
 
@@ -106,11 +107,8 @@ def _parsed(path: Path, root_tag: str) -> etree._Element:
     # A comment before the declaration is common, and no XML.
     if declared is not None:
         text = text[declared.end():]
-    root = guard.parse_hardened(text, str(path), root_tag)
-    for element in root.iter('*'):
-        # Some files of OpenDRIVE 1.6 and later have a namespace, which converters do not expect.
-        element.tag = etree.QName(element).localname
-    return root
+    # Converters do not expect the namespace that some files of OpenDRIVE declare.
+    return guard.parse_hardened(_NAMESPACE.sub('', text, 1), str(path), root_tag)
 
 
 def _finished(text: str, source: Path, kind: WorldKind, cycles: list[LightCycle | None] | None,

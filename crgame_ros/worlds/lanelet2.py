@@ -16,6 +16,10 @@ _LIMIT = re.compile(r'(\d+(?:\.\d+)?)\s*(km/?h|kmh|mph|m/s)?')
 _SIGN = re.compile(r'de274-(\d+)')
 _TO_METRES_A_SECOND = {'mph': 0.44704, 'm/s': 1.0}
 _KMH = 1.0 / 3.6
+# A bound is far longer than the other from this factor on, beyond so many metres.
+_FAR_LONGER, _LONGER = 2.5, 10.0
+
+FloatArray = NDArray[np.float64]
 
 
 def prepare_lanelet2(root: etree._Element, source: str) -> list[str]:
@@ -30,7 +34,8 @@ def prepare_lanelet2(root: etree._Element, source: str) -> list[str]:
     :return: remarks, one line each.
     :raises InputError: if the nodes have no positions.
     """
-    return [*_place_nodes(root, source), *_write_limits(root)]
+    positions, remark = _place_nodes(root, source)
+    return [remark, *_drop_unequal(root, positions), *_write_limits(root)]
 
 
 def _tag(element: etree._Element, key: str) -> str | None:
@@ -44,7 +49,8 @@ def _set_tag(element: etree._Element, key: str, value: str) -> None:
     etree.SubElement(element, 'tag', k=key, v=value)
 
 
-def _place_nodes(root: etree._Element, source: str) -> list[str]:
+def _place_nodes(root: etree._Element, source: str) -> tuple[dict[str, FloatArray], str]:
+    """Write positions that the converter keeps; return them [m], by node, and a remark."""
     nodes = root.findall('node')
     local = _numbers([(_tag(node, 'local_x'), _tag(node, 'local_y')) for node in nodes])
     degrees = _numbers([(node.get('lat'), node.get('lon')) for node in nodes])
@@ -67,10 +73,30 @@ def _place_nodes(root: etree._Element, source: str) -> list[str]:
         for node in nodes:
             for height in node.findall('tag[@k="ele"]'):
                 node.remove(height)
-    return [remark]
+    return {node.get('id', ''): position
+            for node, position in zip(nodes, positions, strict=True)}, remark
 
 
-def _numbers(words: list[tuple[str | None, str | None]]) -> NDArray[np.float64]:
+def _drop_unequal(root: etree._Element, positions: dict[str, FloatArray]) -> list[str]:
+    """Remove lanelets of which one bound is far longer; the converter would fail on them all."""
+    lengths = {way.get('id'): float(np.hypot(*np.diff(np.reshape([
+        positions[node.get('ref', '')] for node in way.iterchildren('nd')
+        if node.get('ref') in positions], (-1, 2)), axis=0).T).sum())
+        for way in root.iterchildren('way')}
+    gone = []
+    for lanelet in root.findall('relation'):
+        bounds = [lengths[ref] for member in lanelet.iterchildren('member')
+                  if member.get('role') in ('left', 'right')
+                  and (ref := member.get('ref')) in lengths]
+        if _tag(lanelet, 'type') == 'lanelet' and len(bounds) == 2 \
+                and max(bounds) > _FAR_LONGER * min(bounds) + _LONGER:
+            gone.append(lanelet.get('id', ''))
+            root.remove(lanelet)
+    return [f'lanelets with one bound far longer than the other are left out: {len(gone)}, '
+            f'the first {gone[0]}'] if gone else []
+
+
+def _numbers(words: list[tuple[str | None, str | None]]) -> FloatArray:
     """Return pairs of numbers (N, 2), NaN for what is none."""
     def number(word: str | None) -> float:
         try:

@@ -5,6 +5,7 @@
 from collections.abc import Iterable, Sequence
 import math
 
+from commonroad.scenario.traffic_sign import TrafficSignIDCountries
 from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.worlds.sumo import LightCycle
 from lxml import etree
@@ -20,6 +21,14 @@ TOLERANCE = 0.01
 _FAR = 100.0
 # A lanelet in parts: its bounds may turn so far in each before they could meet [rad].
 _MOST_TURN = math.pi
+_MOST_PARTS = 12
+# A lane that begins beside the end of another, the other way round: at least so far from it [m],
+# and turned by so much [rad].
+_ASIDE, _BACK = 0.5, 2.0
+_LIMIT_SIGNS = frozenset(kind.MAX_SPEED.value for kind in TrafficSignIDCountries.values()
+                         if hasattr(kind, 'MAX_SPEED'))
+# No limit is greater [m/s].
+_MOST_LIMIT = 100.0
 _SIDES = (('adjacentLeft', 'left'), ('adjacentRight', 'right'))
 
 
@@ -37,6 +46,7 @@ def mend_map(root: etree._Element, cycles: Sequence[LightCycle | None] | None,
     remarks: list[str] = []
     lanelets = {lanelet.get('id'): Bounds(lanelet) for lanelet in root.iterchildren('lanelet')}
     _drop_slivers(root, lanelets, remarks)
+    _drop_turns(root, lanelets, remarks)
     _cut_turning(root, lanelets, remarks)
     before = sum(len(bounds.left) for bounds in lanelets.values())
     for bounds in lanelets.values():
@@ -48,6 +58,7 @@ def mend_map(root: etree._Element, cycles: Sequence[LightCycle | None] | None,
                        f'than {TOLERANCE * 100:g} cm from where it was')
     _place_signs(root, lanelets, remarks)
     _set_cycles(root, cycles, time_step_s, remarks)
+    _spread_limits(root)
     return remarks
 
 
@@ -72,11 +83,10 @@ class Bounds:
 
     @property
     def turn(self) -> float:
-        """Return how far the centre line turns in all, by amount [rad]."""
+        """Return the angle between the extreme headings of the centre line [rad]."""
         steps = np.diff(self.center, axis=0)
         steps = steps[np.hypot(*steps.T) > 1e-6]
-        cross = steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0]
-        return float(np.abs(np.arctan2(cross, (steps[:-1] * steps[1:]).sum(axis=1))).sum())
+        return float(np.ptp(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))) if len(steps) else 0.0
 
     @property
     def is_tangled(self) -> bool:
@@ -176,6 +186,34 @@ def _drop_slivers(root: etree._Element, lanelets: dict[str, Bounds], remarks: li
     remarks.append(f'{len(gone)} lanelets without length or width are left out')
 
 
+def _drop_turns(root: etree._Element, lanelets: dict[str, Bounds], remarks: list[str]) -> None:
+    """Remove links to a lane beside a lane's end, the other way round."""
+    pairs = set()
+    for number, bounds in lanelets.items():
+        pairs |= {(number, link.get('ref')) for link in bounds.element.iterchildren('successor')}
+        pairs |= {(link.get('ref'), number) for link in bounds.element.iterchildren('predecessor')}
+    gone = {pair for pair in pairs if pair[0] in lanelets and pair[1] in lanelets
+            and _is_turn(lanelets[pair[0]].center, lanelets[pair[1]].center)}
+    for before, after in gone:
+        _relink(lanelets[before].element, 'successor', after, ())
+        _relink(lanelets[after].element, 'predecessor', before, ())
+    known = {pair for pair in pairs if pair not in gone}
+    for incoming in root.iterfind('intersection/incoming'):
+        lanes = [each.get('ref') for each in incoming.iterchildren('incomingLanelet')]
+        for tag in ('successorsRight', 'successorsStraight', 'successorsLeft'):
+            for link in incoming.findall(tag):
+                if not any((lane, link.get('ref')) in known for lane in lanes):
+                    incoming.remove(link)
+    if gone:
+        remarks.append(f'{len(gone)} links would make vehicles turn on the spot and are left out')
+
+
+def _is_turn(before: FloatArray, after: FloatArray) -> bool:
+    end, start = before[-1] - before[-2], after[1] - after[0]
+    turn = abs(math.atan2(end[0] * start[1] - end[1] * start[0], float(end @ start)))
+    return turn > _BACK and float(np.hypot(*(after[0] - before[-1]))) > _ASIDE
+
+
 def _relink(element: etree._Element, tag: str, old: str, new: Iterable[str]) -> None:
     """Replace a link of a lanelet by links to others."""
     for link in element.findall(f'{tag}[@ref="{old}"]'):
@@ -199,7 +237,8 @@ def _cut_turning(root: etree._Element, lanelets: dict[str, Bounds], remarks: lis
     for number, bounds in lanelets.items():
         if number not in parts and bounds.is_tangled and bounds.turn > _MOST_TURN:
             group = _beside(number, lanelets)
-            count = math.ceil(max(lanelets[each].turn for each in group) / _MOST_TURN) + 1
+            turn = max(lanelets[each].turn for each in group)
+            count = min(math.ceil(turn / _MOST_TURN) + 1, _MOST_PARTS)
             parts |= dict.fromkeys(group, count)
     if not parts:
         return
@@ -303,3 +342,44 @@ def _set_cycles(root: etree._Element, cycles: Sequence[LightCycle | None] | None
     if off:
         remarks.append(f'{off} of {len(lights)} lights have no program in the file and are off: '
                        'give each a cycle to use them')
+
+
+def _spread_limits(root: etree._Element) -> None:
+    """
+    Let limits hold until the next one: converters write a sign only where the limit changes.
+
+    Signs with more than any limit, which mark the end of one, are removed afterwards.
+    """
+    limits = {sign.get('id'): float(sign.findtext('.//additionalValue', 'nan'))
+              for sign in root.iterchildren('trafficSign')
+              if sign.findtext('.//trafficSignID') in _LIMIT_SIGNS}
+    lanelets = {lanelet.get('id'): lanelet for lanelet in root.iterchildren('lanelet')}
+    own = {number: next((ref for each in lanelet.iterchildren('trafficSignRef')
+                         if (ref := each.get('ref')) in limits), None)
+           for number, lanelet in lanelets.items()}
+    waiting = [number for number, sign in own.items() if sign is not None]
+    for number in waiting:
+        for link in lanelets[number].iterchildren('successor'):
+            after = link.get('ref')
+            if after in own and own[after] is None:
+                own[after] = own[number]
+                _insert_reference(lanelets[after], own[number] or '')
+                waiting.append(after)
+    ends = {sign for sign, limit in limits.items() if not limit < _MOST_LIMIT}
+    for parent in (*lanelets.values(), *root.iterchildren('trafficSign')):
+        for reference in parent.findall('.//trafficSignRef'):
+            if reference.get('ref') in ends:
+                reference.getparent().remove(reference)
+    for sign in root.findall('trafficSign'):
+        if sign.get('id') in ends:
+            root.remove(sign)
+
+
+def _insert_reference(lanelet: etree._Element, sign: str) -> None:
+    """Add a reference to a sign where the schema wants it: before those to lights."""
+    light = lanelet.find('trafficLightRef')
+    reference = etree.Element('trafficSignRef', ref=sign)
+    if light is None:
+        lanelet.append(reference)
+    else:
+        light.addprevious(reference)

@@ -21,6 +21,8 @@ _NO_ROAD = '-1'
 # A curve over 100 m with less deviates by a millimetre from a line or an arc [1/m].
 _SAME_CURVATURE = 1e-7
 _SAME_POINT = 0.01
+# The limit of lanes without one, for the converter [km/h].
+NO_LIMIT = 999.0
 
 
 def prepare_opendrive(root: etree._Element) -> list[str]:
@@ -34,6 +36,7 @@ def prepare_opendrive(root: etree._Element) -> list[str]:
     _number_ids(root)
     _plain_curves(root)
     _connect_directly(root)
+    _limit_lanes(root)
     return _four_corners(root) + _drop_foreign_signals(root)
 
 
@@ -84,6 +87,35 @@ def _connect_directly(root: etree._Element) -> None:
     for connection in root.iterfind('junction/connection'):
         if connection.get('connectingRoad') is None and connection.get('linkedRoad') is not None:
             connection.set('connectingRoad', connection.get('linkedRoad'))
+
+
+def _limit_lanes(root: etree._Element) -> None:
+    """
+    Give every lane a speed limit in km/h: its own, or that of its road, or else `NO_LIMIT`.
+
+    The converter overlooks limits in m/s, and all changes of limits after a lane without one.
+    """
+    for road in root.iterchildren('road'):
+        types = [(float(kind.get('s', '0')), limit) for kind in road.iterchildren('type')
+                 if (limit := _kmh(kind.find('speed'))) is not None]
+        for section in road.iterfind('lanes/laneSection'):
+            start = float(section.get('s', '0'))
+            # A type holds from its start on; some maps begin the first one too late.
+            here = [limit for at, limit in types if at <= start + 1e-3] or [
+                limit for _, limit in types[:1]]
+            for lane in section.iterfind('*/lane'):
+                limit = _kmh(lane.find('speed')) or (here[-1] if here else NO_LIMIT)
+                for speed in lane.findall('speed'):
+                    lane.remove(speed)
+                etree.SubElement(lane, 'speed', sOffset='0', max=repr(limit), unit='km/h')
+
+
+def _kmh(speed: etree._Element | None) -> float | None:
+    """Return a limit [km/h]; None without one. Without a unit it is in m/s."""
+    if speed is None or not _is_float(speed.get('max', '')):
+        return None
+    factor = {'km/h': 1.0, 'mph': 1.609344}.get(speed.get('unit', ''), 3.6)
+    return float(speed.get('max')) * factor or None
 
 
 def _four_corners(root: etree._Element) -> list[str]:

@@ -26,6 +26,7 @@ def to_opendrive(source: Path, is_osm: bool, folder: Path, timeout_s: float,
     """
     Convert a network or an extract to OpenDRIVE.
 
+    :param source: the file; of a network the turns on the spot have to be gone already.
     :param folder: for the files; it gets `map.xodr` and `map.net.xml`.
     :param say: called with a line if SUMO's programs have to be installed.
     :return: the OpenDRIVE file.
@@ -40,10 +41,18 @@ def to_opendrive(source: Path, is_osm: bool, folder: Path, timeout_s: float,
             raise CrgameError(f'{program}: has no osmNetconvert.typ.xml; remove its environment')
         given += ['--type-files', str(types)]
     out = folder / 'map.xodr'
-    run_converter([str(program), *given, '--opendrive-output', str(out),
+    run_converter([str(program), *given, '--no-turnarounds', '--opendrive-output', str(out),
                    '--output-file', str(folder / 'map.net.xml')], folder,
                   f'{source}: netconvert', timeout_s)
     return out
+
+
+def without_turns(network: etree._Element) -> etree._Element:
+    """Return a network without its links for turning round on the spot, as at each junction."""
+    for connection in list(network.iterchildren('connection')):
+        if connection.get('dir') == 't':
+            network.remove(connection)
+    return network
 
 
 def light_cycles(opendrive: etree._Element, network: etree._Element) -> list[LightCycle | None]:
