@@ -110,8 +110,8 @@ def _write_limits(root: etree._Element) -> list[str]:
     """Write all speed limits as the converter reads them: as regulatory elements, in m/s."""
     gone = set()
     for element in root.findall('relation'):
-        if (_tag(element, 'type'), _tag(element, 'subtype')) == ('regulatory_element',
-                                                                  'speed_limit'):
+        kind = _tag(element, 'type'), _tag(element, 'subtype')
+        if kind == ('regulatory_element', 'speed_limit'):
             limit = _speed(_tag(element, 'sign_type') or '')
             if limit is None:
                 gone.add(element.get('id'))

@@ -22,6 +22,10 @@ _FAR = 100.0
 # A lanelet in parts: its bounds may turn so far in each before they could meet [rad].
 _MOST_TURN = math.pi
 _MOST_PARTS = 12
+# The loader refuses bounds of more points that meet; those of fewer it mends where it uses them.
+_MOST_POINTS = 150
+# Of the length of a bound, if its points in the order of its chord make it shorter than this.
+_FOLDED = 0.9
 # A lane that begins beside the end of another, the other way round: at least so far from it [m],
 # and turned by so much [rad].
 _ASIDE, _BACK = 0.5, 2.0
@@ -47,12 +51,13 @@ def mend_map(root: etree._Element, cycles: Sequence[LightCycle | None] | None,
     lanelets = {lanelet.get('id'): Bounds(lanelet) for lanelet in root.iterchildren('lanelet')}
     _drop_slivers(root, lanelets, remarks)
     _drop_turns(root, lanelets, remarks)
-    _cut_turning(root, lanelets, remarks)
     before = sum(len(bounds.left) for bounds in lanelets.values())
     for bounds in lanelets.values():
         bounds.thin_out()
-        bounds.write()
     after = sum(len(bounds.left) for bounds in lanelets.values())
+    _cut_turning(root, lanelets, remarks)
+    for bounds in lanelets.values():
+        bounds.write()
     if after < before:
         remarks.append(f'the bounds have {after} points instead of {before}, none of them more '
                        f'than {TOLERANCE * 100:g} cm from where it was')
@@ -73,7 +78,7 @@ class Bounds:
 
     def __init__(self, element: etree._Element) -> None:
         self.element = element
-        self.left, self.right = (_points(element.find(f'{side}Bound'))
+        self.left, self.right = (_unfolded(_points(element.find(f'{side}Bound')))
                                  for side in ('left', 'right'))
 
     @property
@@ -86,7 +91,8 @@ class Bounds:
         """Return the angle between the extreme headings of the centre line [rad]."""
         steps = np.diff(self.center, axis=0)
         steps = steps[np.hypot(*steps.T) > 1e-6]
-        return float(np.ptp(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))) if len(steps) else 0.0
+        headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+        return float(np.ptp(headings)) if len(headings) else 0.0
 
     @property
     def is_tangled(self) -> bool:
@@ -147,6 +153,17 @@ def _points(bound: etree._Element) -> FloatArray:
     return np.array([[float(value.text) for value in point] for point in bound.iter('point')])
 
 
+def _unfolded(points: FloatArray) -> FloatArray:
+    """Return a bound, ordered along its chord if it folds: a converter adds points backwards."""
+    along = (points - points[0]) @ (points[-1] - points[0])
+    other = points[np.argsort(along, kind='stable')]
+    return other if _length(other) < _FOLDED * _length(points) else points
+
+
+def _length(points: FloatArray) -> float:
+    return float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
+
+
 def _copy(element: etree._Element) -> etree._Element:
     return etree.fromstring(etree.tostring(element))
 
@@ -169,7 +186,7 @@ def _drop_slivers(root: etree._Element, lanelets: dict[str, Bounds], remarks: li
     """Remove lanelets without length or width; their neighbours are linked past them."""
     gone = {number for number, bounds in lanelets.items()
             if len(bounds.left) != len(bounds.right) or len(bounds.left) < 2
-            or np.hypot(*np.diff(bounds.center, axis=0).T).sum() < 0.01
+            or _length(bounds.center) < 0.01
             or np.hypot(*(bounds.left - bounds.right)[:, :2].T).max() < 0.05}
     if not gone:
         return
@@ -235,10 +252,13 @@ def _cut_turning(root: etree._Element, lanelets: dict[str, Bounds], remarks: lis
     """Cut lanelets that turn so far that they meet themselves, with all beside them."""
     parts: dict[str, int] = {}
     for number, bounds in lanelets.items():
-        if number not in parts and bounds.is_tangled and bounds.turn > _MOST_TURN:
+        if number in parts or not bounds.is_tangled:
+            continue
+        count = max(math.ceil(bounds.turn / _MOST_TURN),
+                    math.ceil(len(bounds.left) / _MOST_POINTS))
+        if count > 1:
             group = _beside(number, lanelets)
-            turn = max(lanelets[each].turn for each in group)
-            count = min(math.ceil(turn / _MOST_TURN) + 1, _MOST_PARTS)
+            count = min(count + 1, _MOST_PARTS)
             parts |= dict.fromkeys(group, count)
     if not parts:
         return

@@ -3,6 +3,7 @@
 """Prepares OpenDRIVE maps for the converter, which refuses much of what the standard allows."""
 
 from collections.abc import Iterable
+import itertools
 import math
 
 from lxml import etree
@@ -37,7 +38,7 @@ def prepare_opendrive(root: etree._Element) -> list[str]:
     _plain_curves(root)
     _connect_directly(root)
     _limit_lanes(root)
-    return _four_corners(root) + _drop_foreign_signals(root)
+    return _four_corners(root) + _changes_of_limits(root) + _drop_foreign_signals(root)
 
 
 def _keep_coordinates(root: etree._Element) -> None:
@@ -108,6 +109,26 @@ def _limit_lanes(root: etree._Element) -> None:
                 for speed in lane.findall('speed'):
                     lane.remove(speed)
                 etree.SubElement(lane, 'speed', sOffset='0', max=repr(limit), unit='km/h')
+
+
+def _changes_of_limits(root: etree._Element) -> list[str]:
+    """Tell where limits change between roads or sections, which the converter joins to a lane."""
+    ends: dict[str | None, tuple[set[str], set[str]]] = {}
+    count = 0
+    for road in root.iterchildren('road'):
+        sections = [{speed.get('max', '') for speed in section.iterfind('*/lane/speed')}
+                    for section in road.iterfind('lanes/laneSection')]
+        count += sum(before != after for before, after in itertools.pairwise(sections))
+        if sections:
+            ends[road.get('id')] = sections[0], sections[-1]
+    for road in root.iterchildren('road'):
+        after = road.find('link/successor')
+        if after is not None and after.get('elementType') == 'road' \
+                and road.get('id') in ends and after.get('elementId') in ends:
+            first = 0 if after.get('contactPoint') == 'start' else 1
+            count += ends[road.get('id')][1] != ends[after.get('elementId')][first]
+    return [f'limits change at {count} places between roads or their sections; where the '
+            'converter joins these to one lane, its first limit holds'] if count else []
 
 
 def _kmh(speed: etree._Element | None) -> float | None:

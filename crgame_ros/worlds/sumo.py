@@ -17,6 +17,8 @@ _OSM_OPTIONS = ('--geometry.remove', '--ramps.guess', '--junctions.join', '--rou
                 '--tls.guess-signals', '--tls.discard-simple', '--tls.join',
                 '--tls.default-type', 'static', '--keep-edges.by-vclass', 'passenger',
                 '--remove-edges.isolated', '--output.street-names')
+# Nobody turns round on the spot, and limits are those of the roads in turns as well.
+_OPTIONS = ('--no-turnarounds', '--junctions.limit-turn-speed', '-1')
 # The cycle of a light: durations [s] and colours of CommonRoad.
 LightCycle = list[tuple[float, str]]
 
@@ -41,7 +43,7 @@ def to_opendrive(source: Path, is_osm: bool, folder: Path, timeout_s: float,
             raise CrgameError(f'{program}: has no osmNetconvert.typ.xml; remove its environment')
         given += ['--type-files', str(types)]
     out = folder / 'map.xodr'
-    run_converter([str(program), *given, '--no-turnarounds', '--opendrive-output', str(out),
+    run_converter([str(program), *given, *_OPTIONS, '--opendrive-output', str(out),
                    '--output-file', str(folder / 'map.net.xml')], folder,
                   f'{source}: netconvert', timeout_s)
     return out
