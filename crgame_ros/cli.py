@@ -60,6 +60,8 @@ TOOLS = (
           'crgame_ros.new_command'),
     _Tool('import', 'maps and data sets of other formats, to drive in',
           'crgame_ros.worlds.command'),
+    _Tool('scenarios', 'folders and archives in which scenarios are found by their ids',
+          'crgame_ros.library.command'),
     _Tool('rasterize', 'draw curbs and obstacles of a scenario as an occupancy map',
           'crgame_ros.occupancy.command'),
     _Tool('roads', 'turn way-points (CSV) into a scenario to drive on, or back',
@@ -156,13 +158,13 @@ def _build_parser(chosen: str) -> argparse.ArgumentParser:
 
 
 def _add_offline(parser: argparse.ArgumentParser) -> None:
-    from crgame_ros.launcher.arguments import OPTION_HELP, PROBLEM_HELP
+    from crgame_ros.launcher.arguments import OPTION_HELP, PROBLEM_HELP, SCENARIO_HELP
     parser.description = ('Run a game on a virtual clock, planners in lockstep. The same inputs '
                           'give the same state hash on every run.')
     add = parser.add_argument
     add('game', nargs='?', type=Path, help='game file, CommonRoad file, or name of a game of this '
         'package (default: cut_in)')
-    add('--scenario', type=Path, help='CommonRoad file instead of a game')
+    add('--scenario', type=Path, metavar='FILE.xml|ID', help=f'{SCENARIO_HELP}, instead of a game')
     add('--planner', help='planner of all AVs')
     add('--option', action='append', default=[], metavar='KEY=VALUE', help=OPTION_HELP)
     add('--problem', type=int, action='append', default=[], metavar='ID', help=PROBLEM_HELP)

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
-from crgame_ros.whole_file import write_text
+from crgame_ros.library.lookup import find_scenario
+from crgame_ros.library.stored_index import is_kept
+from crgame_ros.whole_file import write_bytes, write_text
 
 if TYPE_CHECKING:
     from crgame_ros.game.game import Game, PoseSpawn
@@ -27,7 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.description = DESCRIPTION
     add = parser.add_argument
-    add('scenario', type=Path, metavar='FILE.xml', help='CommonRoad file')
+    add('scenario', type=find_scenario, metavar='FILE.xml|ID',
+        help='CommonRoad file, or benchmark id')
     add('--humans', type=int, default=1, metavar='N', help='seats for people (default: 1)')
     add('--driver', default='cockpit', metavar='SOURCE',
         help='the driver of each (default: cockpit, a person at a page)')
@@ -51,6 +54,9 @@ def _new(values: argparse.Namespace) -> int:
     if out.exists():
         raise InputError('is there already', str(out), 'remove it, or name another with --out')
     game = _game(values)
+    beside = out.with_suffix('.xml')
+    if is_kept(game.scenario):
+        _check_absent(beside, game.scenario)
     setup = build_setup(game)
     humans = tuple(replace(human, spawn=_pose(placed.state))
                    for human, placed in zip(game.humans, setup.humans, strict=True))
@@ -58,12 +64,23 @@ def _new(values: argparse.Namespace) -> int:
                    title=game.title or f'{setup.loaded.benchmark_id}, {len(humans)} in seats')
     # Place the vehicles as a reader of the file will.
     build_setup(game, setup.loaded)
+    if is_kept(game.scenario):
+        # A cache may be emptied: what came out of an archive goes with the game.
+        write_bytes(game.scenario.read_bytes(), beside)
+        game = replace(game, scenario=beside)
     write_text(game.dump(), out)
     print(f'{out}: {len(setup.humans)} human(s), {len(setup.avs)} AV(s)')
     for notice in setup.notices:
         print(f'note: {notice}')
     print(f'./run.sh {out}')
     return 0
+
+
+def _check_absent(beside: Path, scenario: Path) -> None:
+    """Refuse to replace another file by the game's copy of its scenario."""
+    if beside.exists() and beside.read_bytes() != scenario.read_bytes():
+        raise InputError('is there already, and the scenario goes there', str(beside),
+                         'remove it, or name another file with --out')
 
 
 def _game(values: argparse.Namespace) -> 'Game':

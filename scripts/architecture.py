@@ -27,7 +27,7 @@ LOWEST, HIGHEST = 'errors, paths, …', 'cli, doctor'
 AT_THE_TOP = {'cli', 'doctor', 'models_command', 'new_command', 'page_libraries_command',
               'replay_command', 'schema_command'}
 FOLDERS = (
-    LOWEST, 'schema', 'geometry', 'vehicle', 'game', 'roads', 'scenario', 'waypoints',
+    LOWEST, 'schema', 'library', 'geometry', 'vehicle', 'game', 'roads', 'scenario', 'waypoints',
     'occupancy', 'scripted', 'messages', 'driver', 'timing', 'drivability', 'control',
     'planner', 'perception', 'policy', 'traffic/compiling', 'traffic/lanes', 'traffic/fleet',
     'traffic/motion', 'traffic/following', 'traffic/crossing', 'traffic/changing', 'traffic',

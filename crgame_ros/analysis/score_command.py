@@ -12,6 +12,7 @@ import sys
 from typing import Any, TYPE_CHECKING
 
 from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.library.lookup import find_scenario
 
 if TYPE_CHECKING:  # A command that needs no engine starts without it.
     from crgame_ros.analysis.scores.planner import PlannerScores
@@ -37,8 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('run', nargs='?', type=Path, help='folder of a run, or its recording')
     parser.add_argument('--epoch', type=int, help='which run of a recording that holds several '
                         '(resets count them from 0; default: the last)')
-    parser.add_argument('--scenario', type=Path, metavar='FILE',
-                        help='CommonRoad file instead of a run, for --solution')
+    parser.add_argument('--scenario', type=find_scenario, metavar='FILE|ID',
+                        help='CommonRoad file, or benchmark id, instead of a run, for --solution')
     parser.add_argument('--solution', type=Path, action='append', default=[], metavar='FILE',
                         help='solution file to score against the run as exported, or against '
                         '--scenario; may be repeated')

@@ -7,6 +7,7 @@ from pathlib import Path
 import sys
 
 from crgame_ros.errors import InputError
+from crgame_ros.library.lookup import find_scenario
 
 DESCRIPTION = """\
 Check files as the program itself does before it reads or after it writes them, and say what is
@@ -24,7 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.description = DESCRIPTION
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument('files', nargs='+', type=Path, metavar='FILE', help='file or folder')
+    parser.add_argument('files', nargs='+', type=Path, metavar='FILE',
+                        help='file or folder, or benchmark id of a scenario')
     parser.set_defaults(command=validate_files)
 
 
@@ -33,7 +35,14 @@ def validate_files(values: argparse.Namespace) -> int:
     from crgame_ros.analysis.validation import parts_of, validate
     from crgame_ros.recording.progress import Progress
     code = 0
-    for path in [part for file in values.files for part in parts_of(file)]:
+    paths = []
+    for file in values.files:
+        try:
+            paths += parts_of(find_scenario(file))
+        except InputError as error:
+            print(f'error: {error}', file=sys.stderr)
+            code = INVALID
+    for path in paths:
         progress = Progress(lambda line: print(line, file=sys.stderr, flush=True),
                             f'reading {path}')
         try:

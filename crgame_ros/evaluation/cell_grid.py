@@ -25,6 +25,7 @@ from crgame_ros.evaluation.cell_scene import (
 from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.source_digest import engine_digest, planner_digest
+from crgame_ros.library.lookup import find_scenarios
 from crgame_ros.planner.registry import create_planner, EXTERNAL
 from crgame_ros.schema.writing import write
 from crgame_ros.simulation.av_assignment import OWN
@@ -124,7 +125,8 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
         *((scene_of_game, path) for path in files_of(
             plan.games, plan.base, GAME_SUFFIXES, 'game file')),
         *((scene_of_scenario, path) for path in files_of(
-            plan.scenarios, plan.base, SCENARIO_SUFFIXES, 'CommonRoad file')),
+            find_scenarios(plan.scenarios, plan.base), plan.base, SCENARIO_SUFFIXES,
+            'CommonRoad file')),
         *((scene_of_run, path) for path in runs_of(plan.humans, plan.base))]
     scenes: list[CellScene] = []
     for number, (make, path) in enumerate(places):

@@ -14,6 +14,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.evaluation.folder import EvaluationFolder, REPORTS
 from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.evaluation.summary.command import add_summary_arguments
+from crgame_ros.library.lookup import names_file
 from crgame_ros.paths import find_game
 from crgame_ros.schema.marks import named_file
 
@@ -75,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add('--games', nargs='+', default=[], metavar='FILE', help='game files, folders of '
         'them, or names of games of this package: cut_in,merge')
     add('--scenarios', nargs='+', default=[], metavar='FILE',
-        help='CommonRoad files, or folders of them')
+        help="CommonRoad files, folders of them, benchmark ids, or patterns of ids: 'USA_*'")
     add('--humans', nargs='+', default=[], metavar='RUN',
         help='recorded runs, whose humans drive again')
     add('--planners', metavar='A,B', help='planners of all AVs')
@@ -168,11 +169,18 @@ def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
     base = values.plan.parent
     read = read_yaml(values.plan, 'plan')
     if isinstance(read, dict):
-        here = {key: [str(Path(name).expanduser().resolve()) for name in given[key]]
+        here = {key: [_from_here(key, name) for name in given[key]]
                 for key in ('games', 'scenarios', 'humans') if key in given}
         read = read | given | here
     return parse_plan(read, str(values.plan), base), \
         values.out or Path('evaluations') / values.plan.stem
+
+
+def _from_here(key: str, name: str) -> str:
+    """Return a name of the command line that is valid beside the plan's file."""
+    if key == 'scenarios' and not names_file(name):
+        return name
+    return str(Path(name).expanduser().resolve())
 
 
 def _given(values: argparse.Namespace) -> dict[str, Any]:

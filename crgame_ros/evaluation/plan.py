@@ -49,7 +49,8 @@ class EvaluationPlan:
     The plan of an evaluation: each scene is combined with each value of all other keys.
 
     :param games: game files, or folders of them; their humans are driven by scripts or are idle.
-    :param scenarios: CommonRoad files, folders of them; no human takes part.
+    :param scenarios: CommonRoad files, folders of them, benchmark ids, patterns of ids such as
+        `USA_*`; no human takes part.
     :param humans: recorded runs, whose humans drive again as they did, in the recorded game.
     :param planners: planners of the AVs.
     :param seeds: number of seeds, from 0 on, or a list of seeds.

@@ -13,6 +13,7 @@ from crgame_ros.game.object_spec import ObjectList
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.task_spec import TaskList
 from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.library.lookup import find_scenario
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import (
     Advice,
@@ -22,6 +23,7 @@ from crgame_ros.schema.marks import (
     Meaning,
     Named,
     Numbered,
+    Sought,
     Within,
     Wording,
 )
@@ -69,6 +71,14 @@ class DriverName(Named):
         if not colon or kind == 'evdev':
             return name
         return f'{kind}:{(base / Path(argument).expanduser()).resolve()}'
+
+
+class ScenarioFile(Sought):
+    """A CommonRoad file, or the benchmark id of a scenario in the user's places."""
+
+    def find(self, name: str, base: Path) -> Path:
+        """Return the path of the file."""
+        return find_scenario(name, base)
 
 
 @dataclass(frozen=True)
@@ -289,7 +299,8 @@ class Game:
     The content of a game file, before the scenario is loaded.
 
     :param title: one displayed line.
-    :param scenario: path of the CommonRoad file.
+    :param scenario: path of the CommonRoad file; in a game file, also a benchmark id, whose file
+        is found in the places of `crgame scenarios`.
     :param humans: the humans' vehicles.
     :param avs: the AVs; None makes one of each planning problem.
     :param duration: simulated seconds until the run ends; infinite by default.
@@ -311,7 +322,7 @@ class Game:
     FORM: ClassVar[Form] = Form(
         _SEE.remedy, moved=(('rate', 'timing'),), first=('title', 'scenario', 'duration', 'seed'))
 
-    scenario: Annotated[Path, Advice('name a CommonRoad file')]
+    scenario: Annotated[Path, ScenarioFile(), Advice('name a CommonRoad file')]
     title: str = ''
     humans: Annotated[tuple[HumanSpec, ...], Listed(noun='vehicle', own='id')] = (
         HumanSpec('hv0'),)

@@ -14,6 +14,7 @@ from crgame_ros.game.driven_vehicle import DrivenHuman
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import Game, HumanSpec
 from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.library.lookup import find_scenario
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.policy.route_guide import RouteGuide
 from crgame_ros.schema.declaration import Form
@@ -125,8 +126,8 @@ def chosen_game(game: Game | Path | str | None, scenario: Path | str | None,
     Return the game of an environment.
 
     :param game: a game, its file, or the name of a shipped one, such as `cut_in`.
-    :param scenario: a CommonRoad file instead: each planning problem is an AV, and the only humans
-        are agents.
+    :param scenario: a CommonRoad file, or a benchmark id, instead: each planning problem is an
+        AV, and the only humans are agents.
     :param seats: seats of the agents.
     :param drivers: driver sources that replace the game's, by human.
     :param planners: planners that replace the game's, by AV.
@@ -137,7 +138,7 @@ def chosen_game(game: Game | Path | str | None, scenario: Path | str | None,
         raise InputError('name a game or a scenario, one of them', 'environment',
                          "such as game='cut_in'")
     if scenario is not None:
-        chosen = Game(Path(scenario).expanduser(), humans=tuple(
+        chosen = Game(find_scenario(Path(scenario).expanduser()), humans=tuple(
             HumanSpec(seat, 'idle') for seat in seats if seat.startswith('hv')))
     elif isinstance(game, Game):
         chosen = game

@@ -11,6 +11,7 @@ import re
 
 from crgame_ros.cockpit.framing_origin import read_origin
 from crgame_ros.errors import InputError
+from crgame_ros.library.lookup import find_scenario, scenario_of
 from crgame_ros.paths import find_game
 from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 
@@ -22,6 +23,7 @@ participants; --scenario alone works on any CommonRoad file: you are placed near
 planning problem becomes an AV, recorded obstacles are replayed. In an exported run its human is
 replayed as well, and you are placed only with --driver."""
 _NAMED_DRIVER = re.compile(r'(hv[0-9]{1,3})=(.+)')
+SCENARIO_HELP = 'CommonRoad file, or benchmark id of a scenario in the places of crgame scenarios'
 OPTION_HELP = ('option of the planners, as under `options` of an AV in a game file; may be given '
                'again')
 PROBLEM_HELP = ('planning problem that becomes an AV, if the game names no AVs; may be repeated '
@@ -48,9 +50,9 @@ class RunRequest:
     """
     The user's request on the command line.
 
-    :param game: game file, or name of one of the package's games; a CommonRoad file is moved to
-        `scenario`.
-    :param scenario: CommonRoad file instead of the game's.
+    :param game: game file, or name of one of the package's games; a CommonRoad file, or a
+        benchmark id, is moved to `scenario`.
+    :param scenario: CommonRoad file instead of the game's; given by an id, it is looked up.
     :param driver: driver source of the first human.
     :param planners: planners of the AVs in their order; a single one serves all.
     :param options: of the planners of all AVs, by name; they go before those of the game.
@@ -108,13 +110,30 @@ class RunRequest:
     own_orders: bool = False
 
     def __post_init__(self) -> None:
+        if self.scenario is not None:
+            object.__setattr__(self, 'scenario', find_scenario(self.scenario))
         if self.game is None:
             return
-        game = find_game(self.game)
+        game = _find_game_or_scenario(self.game)
         is_scenario = game.suffix.lower() == '.xml' and self.scenario is None
         object.__setattr__(self, 'game', None if is_scenario else game)
         if is_scenario:
             object.__setattr__(self, 'scenario', game)
+
+
+def _find_game_or_scenario(name: Path) -> Path:
+    """
+    Return the file of a game or scenario: the one named, a game of the package, or a scenario's.
+
+    :raises InputError: if it is none of them.
+    """
+    try:
+        return find_game(name)
+    except InputError as error:
+        try:
+            return scenario_of(name.name)
+        except InputError:
+            raise error from None
 
 
 class _Parser(argparse.ArgumentParser):
@@ -130,7 +149,7 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add = parser.add_argument
     add('game', nargs='?', type=Path, metavar='GAME', help='game file (YAML), CommonRoad file '
         '(XML), or the name of a game of this package: cut_in, dense_merge, …')
-    add('--scenario', type=Path, metavar='FILE.xml', help='CommonRoad file')
+    add('--scenario', type=Path, metavar='FILE.xml|ID', help=SCENARIO_HELP)
     add('--driver', action='append', default=[], metavar='[hvN=]SOURCE', dest='drivers',
         help="driver of the first human's vehicle, or that of hvN; may be given again")
     add('--planner', action='append', default=[], metavar='NAME', dest='planners',

@@ -19,6 +19,7 @@ from crgame_ros.game.events import PlannerSwap
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, TimingSpec
 from crgame_ros.launcher.arguments import cockpit_host, RunRequest
+from crgame_ros.library.stored_index import is_kept
 from crgame_ros.paths import check_room, default_game, numbered
 from crgame_ros.planner.registry import create_planner, EXTERNAL
 from crgame_ros.policy.policy_file import load_policy
@@ -242,8 +243,9 @@ def _check_run(request: RunRequest, setup: Setup) -> None:
 
 def _plan_in(folder: Path, request: RunRequest, setup: Setup) -> RunPlan:
     """Write the files that the nodes read into the run's folder."""
-    if _own_recording(request) is not None:
-        # The nodes read files: this run's folder gets the scenario that the recording carries.
+    if _own_recording(request) is not None or is_kept(setup.game.scenario):
+        # The nodes read files: this run's folder gets the scenario that the recording carries, or
+        # the one out of an archive, whose copy in the cache may be gone when the run is repeated.
         scenario = folder / 'scenario.xml'
         scenario.write_bytes(guard.encode(setup.loaded.xml_text))
         setup = replace(setup, game=replace(setup.game, scenario=scenario))

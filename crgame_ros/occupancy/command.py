@@ -13,6 +13,7 @@ import tempfile
 import time
 
 from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.library.lookup import find_scenario
 from crgame_ros.occupancy.image import write_pgm
 from crgame_ros.occupancy.map_file import INDEX_NAME, map_text, RasterSpec, read_map_file
 from crgame_ros.occupancy.rasterize import Raster
@@ -165,7 +166,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'road, static obstacles) as an occupancy map in tiles. Each tile is a map_server map '
         '(PGM and YAML). A game takes the map with its key "occupancy".')
     add = parser.add_argument
-    add('scenario', type=Path, help='CommonRoad XML file')
+    add('scenario', type=find_scenario, help='CommonRoad XML file, or benchmark id')
     add('out', type=Path, help='folder for the map; it must be new')
     add('--resolution', type=float, default=default.resolution, metavar='M',
         help='edge of a cell [m] (default: %(default)g)')

@@ -9,10 +9,10 @@ from pathlib import Path
 import re
 
 from crgame_ros.errors import InputError
+from crgame_ros.library.entry import MAX_BYTES
 from crgame_ros.paths import irregular
 from lxml import etree
 
-MAX_BYTES = 64 * 2 ** 20
 MAX_MAGNITUDE = 1e9
 MAX_TIME_STEP = 100_000
 # A plan covers seconds in steps of this length: with 1 ms it would have thousands of states.

@@ -200,6 +200,18 @@ class Named:
         return named_file(name, Path.cwd())
 
 
+class Sought:
+    """A mark of a file that may be given by another name than that of its path."""
+
+    def find(self, name: str, base: Path) -> Path:
+        """
+        Return the path of the file.
+
+        :raises InputError: if a name that is no file name is unknown.
+        """
+        raise NotImplementedError
+
+
 def named_file(name: str, base: Path) -> str:
     """Resolve `FILE.yaml` and `[policy:]FILE.py:Class` against a directory; keep other names."""
     kind = POLICY if name.startswith(POLICY) else ''

@@ -36,6 +36,7 @@ from crgame_ros.schema.marks import (
     Numbered,
     OnlyWith,
     Parts,
+    Sought,
     Special,
     Within,
     Wording,
@@ -315,7 +316,9 @@ class _Reader:
             if isinstance(given, str) and not UNPRINTABLE.search(given) \
                     and (wording is None or wording.fits(given)) and (given or plain is str):
                 if plain is Path:
-                    return self._base / given
+                    sought = mark_of(marks, Sought)
+                    return self._base / given if sought is None \
+                        else sought.find(given, self._base)
                 named = mark_of(marks, Named)
                 return given if named is None else named.resolved(given, self._base)
         elif isinstance(plain, type) and isinstance(given, plain):

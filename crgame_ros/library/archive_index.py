@@ -1,0 +1,191 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The scenarios in an archive, which may come from anywhere.
+
+Nothing is unpacked: members are read into memory, up to the size of a scenario, and the one asked
+for is kept in the user's cache under the digest of its content. A member's name is never a path.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import gzip
+from pathlib import Path
+import tarfile
+from typing import IO, NamedTuple
+import zipfile
+import zlib
+
+from crgame_ros.errors import InputError
+from crgame_ros.library.entry import (
+    Entry,
+    HEAD_BYTES,
+    header_id,
+    MAX_BYTES,
+    may_be_scenario,
+    MOST_FILES,
+)
+from crgame_ros.library.stored_index import (
+    digest_of,
+    keep_file,
+    kept_file,
+    load_index,
+    save_index,
+)
+
+# What a compressed tar may hold: all of it is decompressed to find the members [bytes].
+_MOST_BYTES = 64 * 2 ** 30
+_ENCRYPTED = 1
+
+
+class _Row(NamedTuple):
+    """
+    What is known of a member.
+
+    :param header_id: benchmark id in it.
+    :param digest: of its content; empty where the archive lets one member be read alone.
+    :param offset: of its content in the unpacked tar [bytes]
+    :param size: [bytes]
+    """
+
+    header_id: str
+    digest: str
+    offset: int
+    size: int
+
+
+class ArchiveIndex:
+    """
+    The scenarios of an archive: .zip, .tar, .tar.gz or .tgz.
+
+    :param place: the archive.
+    """
+
+    def __init__(self, place: Path) -> None:
+        self.place = place
+        self._rows: dict[str, _Row] = {}
+
+    def entries(self, *, trusting: bool,
+                tell: Callable[[int], object] = lambda _: None) -> list[Entry]:
+        """
+        Return the scenarios in the order of their names.
+
+        They are read again if time of change or size of the archive differ.
+
+        :param trusting: for folders; an archive is always believed by its time and size.
+        :param tell: called with the number of members seen so far.
+        :raises InputError: if the archive cannot be read, or holds too much.
+        """
+        with self._readable():
+            status = self.place.stat()
+            stamp = [status.st_mtime_ns, status.st_size]
+            known = load_index(self.place)
+            if known.get('stamp') != stamp:
+                read = self._zipped if self._is_zip else self._tarred
+                known = {'stamp': stamp, 'members': dict(read(tell))}
+                save_index(self.place, known)
+        self._rows = {name: _Row(*row) for name, row in known['members'].items()}
+        return [Entry(self.place, name, row.header_id)
+                for name, row in sorted(self._rows.items())]
+
+    def path_of(self, entry: Entry) -> Path:
+        """
+        Return the path of a scenario's copy in the user's cache.
+
+        :raises InputError: if it cannot be read or written.
+        """
+        digest = self._rows[entry.name].digest
+        if digest and (kept := kept_file(digest, entry.id)).is_file():
+            return kept
+        return keep_file(self._content(entry), entry.id)
+
+    def digest_of(self, entry: Entry) -> str:
+        """
+        Return the digest of a scenario's content.
+
+        :raises InputError: if it cannot be read.
+        """
+        return self._rows[entry.name].digest or digest_of(self._content(entry))
+
+    def _content(self, entry: Entry) -> bytes:
+        row = self._rows[entry.name]
+        with self._readable():
+            if self._is_zip:
+                with zipfile.ZipFile(self.place) as archive, archive.open(entry.name) as stream:
+                    return _bounded(stream)
+            with self._tar_stream() as stream:
+                stream.seek(row.offset)
+                return stream.read(row.size)
+
+    def is_current(self, entry: Entry) -> bool:
+        """Return whether a scenario is still there: its archive was just compared."""
+        return entry.name in self._rows
+
+    @property
+    def _is_zip(self) -> bool:
+        return self.place.name.lower().endswith('.zip')
+
+    def _zipped(self, tell: Callable[[int], object]) -> Iterator[tuple[str, _Row]]:
+        with zipfile.ZipFile(self.place) as archive:
+            for number, member in enumerate(archive.infolist()):
+                self._check_count(number)
+                tell(number)
+                if member.is_dir() or member.flag_bits & _ENCRYPTED \
+                        or not may_be_scenario(member.filename, member.file_size):
+                    continue
+                with archive.open(member) as stream:
+                    found = header_id(stream.read(HEAD_BYTES))
+                if found is not None:
+                    yield member.filename, _Row(found, '', 0, member.file_size)
+
+    def _tarred(self, tell: Callable[[int], object]) -> Iterator[tuple[str, _Row]]:
+        with self._tar_stream() as stream, tarfile.open(fileobj=stream, mode='r:') as archive:
+            for number, member in enumerate(archive):
+                self._check_count(number)
+                tell(number)
+                if member.offset_data + member.size > _MOST_BYTES:
+                    raise InputError(f'holds more than {_MOST_BYTES // 2 ** 30} GiB',
+                                     str(self.place), 'unpack it, and name the folder')
+                if not member.isreg() or member.issparse() \
+                        or not may_be_scenario(member.name, member.size):
+                    continue
+                body = archive.extractfile(member)
+                content = b'' if body is None else _bounded(body)
+                found = header_id(content[:HEAD_BYTES])
+                if found is not None:
+                    yield member.name, _Row(found, digest_of(content), member.offset_data,
+                                            member.size)
+
+    @contextmanager
+    def _tar_stream(self) -> 'Iterator[IO[bytes]]':
+        if self.place.name.lower().endswith('.tar'):
+            with self.place.open('rb') as stream:
+                yield stream
+        else:
+            with gzip.open(self.place, 'rb') as unpacked:
+                yield unpacked  # type: ignore[misc]
+
+    @contextmanager
+    def _readable(self) -> Iterator[None]:
+        """Turn what archives can raise into one error."""
+        try:
+            yield
+        except (OSError, zipfile.BadZipFile, tarfile.TarError, EOFError, zlib.error, KeyError,
+                NotImplementedError, ValueError, RuntimeError) as error:
+            said = getattr(error, 'strerror', None) or error
+            raise InputError(f'cannot be read as an archive ({said})', str(self.place),
+                             'copy the file again, or remove it: crgame scenarios remove'
+                             ) from error
+
+    def _check_count(self, number: int) -> None:
+        if number >= MOST_FILES:
+            raise InputError(f'holds more than {MOST_FILES} files', str(self.place),
+                             'unpack it, and name the folder with the scenarios')
+
+
+def _bounded(stream: IO[bytes]) -> bytes:
+    """Return what a member holds, whatever size its header claims."""
+    content = stream.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        raise ValueError(f'a member has more than {MAX_BYTES // 2 ** 20} MiB')
+    return content

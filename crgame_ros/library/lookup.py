@@ -1,0 +1,176 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Finds scenarios by their benchmark ids in the places that the user has named."""
+
+from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
+import logging
+import os
+from pathlib import Path
+import re
+from typing import NamedTuple
+
+from crgame_ros.errors import InputError, one_line
+from crgame_ros.library.archive_index import ArchiveIndex
+from crgame_ros.library.entry import Entry
+from crgame_ros.library.folder_index import FolderIndex
+from crgame_ros.library.places import all_places, is_archive
+
+_LOGGER = logging.getLogger(__name__)
+_PATTERN = re.compile(r'[*?\[]')
+_NO_ID = ('.xml', '.yaml', '.yml', '.json', '.jsonl', '.mcap', '.db3', '.csv')
+_ADD = 'name a folder or archive that has it: crgame scenarios add DIR'
+_GUESSES = 3
+# All ids end alike, so much of them is the same in any two.
+_ALIKE = 0.8
+
+Index = FolderIndex | ArchiveIndex
+
+
+class _Hit(NamedTuple):
+
+    place: Index
+    entry: Entry
+
+
+def is_id(name: str) -> bool:
+    """Return whether a name can be a benchmark id, by its form: it has no folder and no ending."""
+    return bool(name.strip('.')) and os.sep not in name and not name.startswith('~') \
+        and name.isprintable() and not name.lower().endswith(_NO_ID)
+
+
+def names_file(name: str, base: Path = Path()) -> bool:
+    """Return whether a name is that of a file or folder, there or not; otherwise it is an id."""
+    return not is_id(name) or os.path.lexists(base / name)
+
+
+def find_scenario(name: str | Path, base: Path = Path()) -> Path:
+    """
+    Return the file of a scenario: the file named, which need not exist, or the one with this id.
+
+    :param name: file name or benchmark id.
+    :param base: directory against which file names are resolved.
+    :raises InputError: if an id is in none of the places.
+    """
+    text = str(name)
+    return base / text if names_file(text, base) else scenario_of(text)
+
+
+def find_scenarios(names: Sequence[str], base: Path = Path()) -> tuple[str, ...]:
+    """
+    Return names of files, where ids and patterns of ids such as `USA_*` are replaced.
+
+    :raises InputError: if an id or a pattern is in none of the places.
+    """
+    found: list[str] = []
+    for name in names:
+        if names_file(name, base):
+            found.append(name)
+        elif _PATTERN.search(name):
+            found += map(str, scenarios_like(name))
+        else:
+            found.append(str(scenario_of(name)))
+    return tuple(found)
+
+
+def index_of(place: Path) -> Index:
+    """Return the index of a folder or an archive."""
+    return FolderIndex(place) if place.is_dir() or not is_archive(place) else ArchiveIndex(place)
+
+
+def scenario_of(benchmark_id: str) -> Path:
+    """
+    Return the file of a scenario by its id: the name of the file, or else the id in it.
+
+    The first place that has it wins. If another file of this id has other content, a warning is
+    logged.
+
+    :raises InputError: if no place has it.
+    """
+    hits = _hits(benchmark_id, trusting=True)
+    if not hits or not all(hit.place.is_current(hit.entry) for hit in hits):
+        # The times of folders may hide a change, and say nothing of changes within files.
+        hits = _hits(benchmark_id, trusting=False)
+    if not hits:
+        raise _unknown(benchmark_id)
+    path = hits[0].place.path_of(hits[0].entry)
+    _warn_of_others(benchmark_id, hits)
+    return path
+
+
+def scenarios_like(pattern: str) -> list[Path]:
+    """
+    Return the files of all scenarios whose id fits a pattern with `*` and `?`, by their ids.
+
+    :raises InputError: if there is none.
+    """
+    found: dict[str, _Hit] = {}
+    for index in _present():
+        for entry in index.entries(trusting=False):
+            if fnmatchcase(entry.id, pattern):
+                found.setdefault(entry.id, _Hit(index, entry))
+    if not found:
+        raise InputError('no scenario has an id like this', pattern,
+                         _ADD)
+    return [found[name].place.path_of(found[name].entry) for name in sorted(found)]
+
+
+def all_ids() -> list[str]:
+    """Return the ids of all scenarios of all places, sorted."""
+    return sorted({entry.id for index in _present() for entry in index.entries(trusting=False)})
+
+
+def _present() -> Iterator[Index]:
+    """Yield the indexes of the places that are there."""
+    for place in all_places():
+        if place.exists():
+            yield index_of(place)
+
+
+def _hits(benchmark_id: str, *, trusting: bool) -> list[_Hit]:
+    """Return the scenarios of an id: those of this file name, else those with this id in them."""
+    named: list[_Hit] = []
+    headed: list[_Hit] = []
+    for index in _present():
+        for entry in index.entries(trusting=trusting):
+            if entry.id == benchmark_id:
+                named.append(_Hit(index, entry))
+            elif entry.header_id == benchmark_id:
+                headed.append(_Hit(index, entry))
+    return named or headed
+
+
+def _warn_of_others(benchmark_id: str, hits: Sequence[_Hit]) -> None:
+    first = hits[0]
+    try:
+        digest = first.place.digest_of(first.entry) if len(hits) > 1 else ''
+        others = [hit for hit in hits[1:] if hit.place.digest_of(hit.entry) != digest]
+    except InputError:
+        # Only the first is needed, and who reads it says what is wrong with it.
+        return
+    if others:
+        _LOGGER.warning('%s', one_line(
+            f'note: {benchmark_id} is {_place_of(first)}; of the same id and other content: '
+            + _place_of(others[0])
+            + (f' and {len(others) - 1} more' if len(others) > 1 else '')))
+
+
+def _place_of(hit: _Hit) -> str:
+    return str(hit.entry.place / hit.entry.name)
+
+
+def _unknown(benchmark_id: str) -> InputError:
+    ids = all_ids()
+    missing = [str(place) for place in all_places() if not place.exists()]
+    away = f', and {missing[0]} is not there' if missing else ''
+    return InputError(
+        f'is no file, and none of the {len(ids)} known scenarios{away}', benchmark_id,
+        f'{_guess(benchmark_id, ids)}{_ADD}')
+
+
+def _guess(benchmark_id: str, ids: Sequence[str]) -> str:
+    # Imported here because it is seldom needed.
+    from difflib import get_close_matches
+    folded = {known.casefold(): known for known in ids}
+    near = get_close_matches(benchmark_id[:80].casefold(), folded, _GUESSES, _ALIKE)
+    return f'did you mean {", ".join(folded[name] for name in near)}? ' if near else ''

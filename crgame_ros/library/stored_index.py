@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The user's cache: indexes of places, which can be made again, and files out of archives."""
+
+import contextlib
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.paths import PACKAGE
+from crgame_ros.whole_file import write_bytes, write_whole
+
+FORMAT = 1
+_DIGITS = 16
+
+
+def cache_folder() -> Path:
+    """Return the folder of indexes and of files out of archives."""
+    home = os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache'
+    return Path(home) / PACKAGE / 'scenarios'
+
+
+def load_index(place: Path) -> dict[str, Any]:
+    """Read what is known of a place; empty if that is nothing, or cannot be read."""
+    try:
+        found = json.loads(_index_file(place).read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return {}
+    known = isinstance(found, dict) and found.get('format') == FORMAT \
+        and found.get('place') == str(place)
+    return found['content'] if known and isinstance(found['content'], dict) else {}
+
+
+def save_index(place: Path, content: dict[str, Any]) -> None:
+    """Write what is known of a place, if the cache can be written."""
+    file = _index_file(place)
+    text = json.dumps({'format': FORMAT, 'place': str(place), 'content': content},
+                      separators=(',', ':'))
+    # Without a cache, places are only slower.
+    with contextlib.suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(text.encode(), file)
+
+
+def drop_index(place: Path) -> None:
+    """Remove what is known of a place."""
+    with contextlib.suppress(OSError):
+        _index_file(place).unlink(missing_ok=True)
+
+
+def digest_of(content: bytes) -> str:
+    """Return the digest under which a file out of an archive is kept."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def kept_file(digest: str, name: str) -> Path:
+    """Return the path of a file out of an archive; its folder names the content."""
+    return cache_folder() / 'files' / digest[:_DIGITS] / f'{name}.xml'
+
+
+def keep_file(content: bytes, name: str) -> Path:
+    """
+    Keep a file out of an archive.
+
+    :param name: its name without ending, and without folders.
+    :return: its path.
+    :raises InputError: if it cannot be written.
+    """
+    path = kept_file(digest_of(content), name)
+    try:
+        if path.stat().st_size == len(content):
+            return path
+    except OSError:
+        pass
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f'cannot be made ({error.strerror})', str(path.parent),
+                         'set XDG_CACHE_HOME to a folder that can be written') from error
+    write_bytes(content, path)
+    return path
+
+
+def is_kept(path: Path) -> bool:
+    """Return whether a file lies in the cache, and may so be gone tomorrow."""
+    return path.resolve().is_relative_to(cache_folder().resolve())
+
+
+def _index_file(place: Path) -> Path:
+    digest = hashlib.sha256(os.fsencode(place)).hexdigest()[:_DIGITS]
+    return cache_folder() / f'index-{digest}.json'
