@@ -52,6 +52,8 @@ TOOLS = (
           'crgame_ros.reproduction.reproduce_command'),
     _Tool('evaluate', 'planners x scenarios x recorded humans x seeds, into tables',
           'crgame_ros.evaluation.evaluate_command'),
+    _Tool('submit', "solutions for CommonRoad's benchmark, checked, in one archive",
+          'crgame_ros.submission.command'),
     _Tool('study', 'experiments with people: plan them, and find mistakes',
           'crgame_ros.study.conduct.study_command'),
     _Tool('validate', 'whether files are valid: scenarios, games, recordings, tables',

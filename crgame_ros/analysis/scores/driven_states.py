@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A vehicle's drive as states of CommonRoad's kinematic single-track model."""
 
+from collections.abc import Sequence
+import math
 from typing import NamedTuple
 
 from commonroad.common.solution import vehicle_parameters, VehicleType
 from commonroad.planning.planning_problem import PlanningProblem
-from commonroad.scenario.state import KSState
+from commonroad.scenario.state import KSState, PMState
 from commonroad.scenario.trajectory import Trajectory
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.reference_point import shifted
@@ -47,25 +49,46 @@ def choose_type(vehicle: VehicleParameters) -> ChosenType:
     return ChosenType(VehicleType(number), least)
 
 
-def driven_states(log: RunTrajectories, vehicle: int, kind: VehicleType) -> list[KSState]:
+def driven_states(log: RunTrajectories, vehicle: int, kind: VehicleType,
+                  first_step: int = 0) -> list[KSState]:
     """
-    Return a vehicle's states of the KS model, from time step 0 on.
+    Return a vehicle's states of the KS model, at all steps of a run.
 
     The rear axle keeps its position; the model's centre is ahead of it by the type's own distance.
 
     :param vehicle: its number among the driven ones.
+    :param first_step: time step of the first state.
     """
     states = log.vehicle_states[:, vehicle]
     centers = shifted(states[:, :3], vehicle_parameters[kind].b)
     yaws = wrap_pi_array(states[:, StateColumn.YAW])
     return [
-        KSState(time_step=row, position=centers[row, :2].copy(),
+        KSState(time_step=first_step + row, position=centers[row, :2].copy(),
                 steering_angle=float(states[row, StateColumn.STEERING_ANGLE]),
                 velocity=float(states[row, StateColumn.SPEED]), orientation=float(yaws[row]))
         for row in range(len(states))]
 
 
-def goal_step(problem: PlanningProblem, states: list[KSState]) -> int | None:
+def point_mass_states(states: Sequence[KSState], kind: VehicleType) -> list[PMState]:
+    """
+    Return the states of a point mass at the centre of a vehicle of the KS model.
+
+    The velocity of the centre has the part of the rear axle's along the heading, and across it
+    the yaw rate v tan(delta) / (a + b) times the distance b between them.
+    """
+    known = vehicle_parameters[kind]
+    return [
+        PMState(time_step=state.time_step, position=state.position.copy(),
+                velocity=state.velocity * math.cos(state.orientation)
+                - across * math.sin(state.orientation),
+                velocity_y=state.velocity * math.sin(state.orientation)
+                + across * math.cos(state.orientation))
+        for state in states
+        for across in (known.b * state.velocity * math.tan(state.steering_angle)
+                       / (known.a + known.b),)]
+
+
+def goal_step(problem: PlanningProblem, states: Sequence[KSState | PMState]) -> int | None:
     """Find the first state that meets the goal; None without one."""
     if not problem.goal.state_list:
         return None
@@ -75,7 +98,7 @@ def goal_step(problem: PlanningProblem, states: list[KSState]) -> int | None:
     return None
 
 
-def is_reached(problem: PlanningProblem, state: KSState) -> bool:
+def is_reached(problem: PlanningProblem, state: KSState | PMState) -> bool:
     """Return whether a state meets the goal; a goal on a value that the state lacks is not met."""
     try:
         return bool(problem.goal.is_reached(state))
@@ -83,7 +106,7 @@ def is_reached(problem: PlanningProblem, state: KSState) -> bool:
         return False
 
 
-def until_goal(states: list[KSState], step: int | None) -> Trajectory:
+def until_goal(states: Sequence[KSState | PMState], step: int | None) -> Trajectory:
     """Return the trajectory up to the goal, as a solution needs it."""
     kept = states if step is None else states[:max(step, 1) + 1]
-    return Trajectory(kept[0].time_step, kept)
+    return Trajectory(kept[0].time_step, list(kept))

@@ -20,7 +20,12 @@ from crgame_ros.analysis.scores.planner import PlannerScores, REMARKS
 from crgame_ros.analysis.scores.scored_drive import drive_among, ScoredDrive, Track
 from crgame_ros.analysis.scores.scored_drives import recorded_expert
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
-from crgame_ros.analysis.scores.solution_judge import poses_of, SolutionJudge, speeds_of
+from crgame_ros.analysis.scores.solution_judge import (
+    poses_of,
+    SolutionJudge,
+    SolutionScores,
+    speeds_of,
+)
 from crgame_ros.analysis.scores.trajectory_feasibility import check_feasibility, simulated
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.errors import InputError, one_line
@@ -54,6 +59,21 @@ def score_solutions(scored: ScoredScenario, solutions: Mapping[str, Solution],
         progress((number + 1) / len(solutions))
     return PlannerScores(scored.loaded.scenario.scenario_id, scored.loaded.xml_text,
                          tuple(vehicles), (*REMARKS, *scored.loaded.notices))
+
+
+def judge_solution(scored: ScoredScenario, solution: Solution) -> list[SolutionScores]:
+    """
+    Judge a solution with CommonRoad's tools alone, by its own cost function.
+
+    :return: the results for each planning problem that it solves.
+    :raises InputError: if it is for another scenario, or cannot be driven at all.
+    """
+    judge, failed = SolutionJudge(scored), _failures(scored, solution)
+    parts = [_part(scored, found, solution.benchmark_id)
+             for found in solution.planning_problem_solutions]
+    solved = frozenset(part.found.planning_problem_id for part in parts)
+    return [judge.judge(part.found, part.driven, failed=failed, others=solved,
+                        costs=(part.found.cost_function.name,)) for part in parts]
 
 
 def _score(scored: ScoredScenario, judge: SolutionJudge, nuplan: NuplanScorer, name: str,

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Judges solutions of planning problems with CommonRoad's tools."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from commonroad.common.solution import CostFunction, PlanningProblemSolution, Solution
@@ -71,7 +71,7 @@ class SolutionJudge:
 
     def judge(self, found: PlanningProblemSolution, driven: Trajectory, *,
               exact_type: bool = True, failed: Mapping[str, str] | None = None,
-              others: frozenset[int] = frozenset(),
+              others: frozenset[int] = frozenset(), costs: Sequence[str] = tuple(COSTS),
               progress: Callable[[float], object] = lambda _: None) -> SolutionScores:
         """
         Judge one solution.
@@ -81,6 +81,7 @@ class SolutionJudge:
         :param exact_type: whether its vehicle type has the vehicle's dimensions.
         :param failed: failures of other checks of the solution, by name.
         :param others: planning problems that are solved together with it.
+        :param costs: names of the cost functions to evaluate.
         :param progress: called with the share done so far, 0 to 1.
         """
         problem = self._scored.problem(found.planning_problem_id)
@@ -90,7 +91,8 @@ class SolutionJudge:
                                 feasibility, self._boundary, failed or {})
         return SolutionScores(
             found, exact_type,
-            evaluate_costs(scenario, problem, driven, found.vehicle_type), checks, feasibility)
+            evaluate_costs(scenario, problem, driven, found.vehicle_type, costs), checks,
+            feasibility)
 
 
 def poses_of(states: list[TraceState]) -> FloatArray:
