@@ -54,6 +54,8 @@ TOOLS = (
           'crgame_ros.evaluation.evaluate_command'),
     _Tool('submit', "solutions for CommonRoad's benchmark, checked, in one archive",
           'crgame_ros.submission.command'),
+    _Tool('test', 'games that say what they expect, as tests of a planner',
+          'crgame_ros.verdict.command'),
     _Tool('study', 'experiments with people: plan them, and find mistakes',
           'crgame_ros.study.conduct.study_command'),
     _Tool('validate', 'whether files are valid: scenarios, games, recordings, tables',

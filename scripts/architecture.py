@@ -36,8 +36,8 @@ FOLDERS = (
     'analysis',
     'evaluation/results', 'evaluation/summary', 'evaluation', 'study', 'study/data', 'cockpit',
     'cockpit/runs', 'study/desk', 'gym', 'ros', 'nodes/sim', 'nodes/cockpit', 'nodes/markers',
-    'nodes', 'launcher', 'submission', 'study/conduct', 'reproduction', 'python_interface',
-    HIGHEST)
+    'nodes', 'launcher', 'submission', 'verdict', 'study/conduct', 'reproduction',
+    'python_interface', HIGHEST)
 BEGIN, END = '<!-- folders: begin -->', '<!-- folders: end -->'
 # Of the picture [px].
 CELL, NAMES, TOP = 22, 150, 120

@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import EventList
+from crgame_ros.game.expectation import ExpectationList
 from crgame_ros.game.object_spec import ObjectList
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.task_spec import TaskList
@@ -316,6 +317,7 @@ class Game:
     :param sound: whether pages may play sound and gamepads rumble; `none` for a study without.
     :param environment: light and air in the displayed world.
     :param tasks: tasks that drivers answer or do besides driving.
+    :param expect: what a run has to keep, for `crgame test`.
     :param language: of the texts for drivers during the drive, if the page's address names none.
     """
 
@@ -341,6 +343,7 @@ class Game:
     sound: Annotated[Literal['on', 'none'], Meaning(True, 'on'), LeftOut()] = 'on'
     environment: EnvironmentSpec | None = None
     tasks: Annotated[TaskList, LeftOut()] = ()
+    expect: Annotated[ExpectationList, LeftOut()] = ()
     language: Annotated[Literal['en', 'de'], LeftOut()] = 'en'
 
     def _repr_html_(self) -> str:

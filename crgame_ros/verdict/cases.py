@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The cases of a test: a run of a game with a seed each, on all cores."""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import as_completed, ProcessPoolExecutor
+from dataclasses import dataclass, field, replace
+import multiprocessing
+from pathlib import Path
+import time
+
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.game.expectation import Expectation
+from crgame_ros.game.file import load_game
+from crgame_ros.game.game import Game
+
+REPORT = 'report.html'
+
+
+@dataclass(frozen=True)
+class Case:
+    """
+    A game to run with a seed.
+
+    :param game: its file.
+    :param seed: of everything random.
+    :param planner: of all AVs; None for those of the game.
+    :param options: of this planner.
+    """
+
+    game: Path
+    seed: int
+    planner: str | None = None
+    options: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Return its name for people."""
+        return f'{self.game.stem}[{self.seed}]'
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """
+    What became of a case.
+
+    :param case: the case.
+    :param expectations: of the game.
+    :param broken: for each of them, how the run broke it, a line for each vehicle.
+    :param error: why it could not be run; empty if it could.
+    :param wall_s: time that it took.
+    :param folder: with report and scenario of a run that broke something; None without.
+    """
+
+    case: Case
+    expectations: tuple[Expectation, ...]
+    broken: tuple[tuple[str, ...], ...]
+    error: str
+    wall_s: float
+    folder: Path | None = None
+
+    @property
+    def is_good(self) -> bool:
+        """Return whether it ran and kept every expectation, whatever its share."""
+        return not self.error and not any(self.broken)
+
+
+def find_games(places: Sequence[Path]) -> list[Path]:
+    """
+    Return the game files of files and folders; of a folder those with expectations.
+
+    :raises InputError: if there is none.
+    """
+    found = []
+    for place in places:
+        if place.is_dir():
+            files = sorted(file for file in place.rglob('*.yaml') if file.stem.count('.') == 0)
+            found += [file for file in files if _has_expectations(file)]
+        elif place.is_file():
+            found.append(place)
+        else:
+            raise InputError('does not exist', str(place), 'name a game file or a folder of them')
+    if not found:
+        raise InputError('no game there has expectations', ', '.join(map(str, places))[:200],
+                         'add `expect:` to a game file: docs/testing.md')
+    return list(dict.fromkeys(found))
+
+
+def _has_expectations(file: Path) -> bool:
+    try:
+        return any(line.startswith('expect:') for line in file.read_text().splitlines())
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def run_case(case: Case, out: Path) -> CaseResult:
+    """
+    Run a case, and judge it.
+
+    :param out: folder for the reports of runs that break an expectation.
+    """
+    # Imported here: the process that only hands cases out does not need them.
+    from crgame_ros.analysis.report.file import write_report
+    from crgame_ros.analysis.runs.run import Run
+    from crgame_ros.evaluation.results.cell_rows import vehicle_rows
+    from crgame_ros.recording.export import write_scenario
+    from crgame_ros.simulation.offline import run_offline
+    from crgame_ros.simulation.setup import build_setup
+    from crgame_ros.verdict.judging import check_expectations, shortfalls
+    began = time.perf_counter()
+    expectations: tuple[Expectation, ...] = ()
+    try:
+        game = load_game(case.game)
+        expectations = game.expect
+        check_expectations(game, str(case.game))
+        setup = build_setup(_adapted(game, case))
+        result = run_offline(setup)
+        run = Run(case.name, result=result, scoring='drives')
+        rows = vehicle_rows(run, result)
+        broken = tuple(tuple(shortfalls(each, rows)) for each in expectations)
+        folder = None
+        if any(broken):
+            folder = out / f'{case.game.stem}-{case.seed}'
+            folder.mkdir(parents=True, exist_ok=True)
+            write_report([run], folder / REPORT)
+            write_scenario(run.log, folder)
+            (folder / 'game.yaml').write_text(_adapted(game, case).dump())
+    except CrgameError as error:
+        return CaseResult(case, expectations, (), str(error), time.perf_counter() - began)
+    return CaseResult(case, expectations, broken, '', time.perf_counter() - began, folder)
+
+
+def _adapted(game: Game, case: Case) -> Game:
+    """Return the game with the seed and the planner of a case."""
+    if case.planner is not None:
+        from crgame_ros.scenario.loading import load_scenario
+        from crgame_ros.simulation.av_assignment import adapt_game
+        game = adapt_game(game, load_scenario(game.scenario), seed=case.seed,
+                          planner=case.planner, options=dict(case.options))
+    return replace(game, seed=case.seed)
+
+
+def run_cases(cases: Sequence[Case], out: Path, workers: int,
+              told: Callable[[CaseResult], object]) -> list[CaseResult]:
+    """
+    Run cases on several processes.
+
+    :param told: called with each result as it comes.
+    :return: in the order of the cases.
+    """
+    found: dict[int, CaseResult] = {}
+    context = multiprocessing.get_context('spawn')
+    with ProcessPoolExecutor(min(workers, len(cases)), mp_context=context) as pool:
+        waiting = {pool.submit(run_case, case, out): number
+                   for number, case in enumerate(cases)}
+        try:
+            for done in as_completed(waiting):
+                number = waiting[done]
+                try:
+                    result = done.result()
+                except Exception as error:  # a process that died, or a planner's fault
+                    result = CaseResult(cases[number], (), (),
+                                        f'{type(error).__name__}: {error}', 0.0)
+                found[number] = result
+                told(result)
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return [found[number] for number in range(len(cases))]

@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The verdict on each expectation of a game, over all its runs."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from xml.etree import ElementTree
+
+from crgame_ros.verdict.cases import CaseResult
+from scipy.stats import binomtest
+
+_LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """
+    The verdict on one expectation, or on a game that could not be run.
+
+    :param game: file of the game.
+    :param told: the expectation in words; of a game that could not be run, that.
+    :param good: number of runs that kept it.
+    :param runs: number of runs.
+    :param needed: share of the runs that has to keep it.
+    :param broken: runs that did not, each with how, a line for each vehicle.
+    :param wall_s: time that the runs took together.
+    """
+
+    game: Path
+    told: str
+    good: int
+    runs: int
+    needed: float
+    broken: tuple[tuple[CaseResult, tuple[str, ...]], ...]
+    wall_s: float
+
+    @property
+    def is_kept(self) -> bool:
+        """Return whether enough runs kept it."""
+        return self.good >= self.needed * self.runs
+
+    def interval(self) -> tuple[float, float]:
+        """Return the 95 % interval (Wilson) of the share of runs that keep it."""
+        found = binomtest(self.good, self.runs).proportion_ci(_LEVEL, 'wilson')
+        return float(found.low), float(found.high)
+
+    def share(self) -> str:
+        """Return the share of good runs, with its interval if there are several."""
+        if self.runs == 1:
+            return 'kept' if self.good else 'broken'
+        low, high = self.interval()
+        return (f'{self.good} of {self.runs} runs, {100 * self.good / self.runs:.0f} % '
+                f'({100 * low:.0f} to {100 * high:.0f} %)')
+
+
+def verdicts_of(results: Sequence[CaseResult]) -> Iterator[Verdict]:
+    """Yield the verdicts of each game, in order: first on whether it runs, if it does not."""
+    for game, group in groupby(results, lambda result: result.case.game):
+        runs = list(group)
+        wall_s = sum(result.wall_s for result in runs)
+        failed = [result for result in runs if result.error]
+        if failed:
+            yield Verdict(game, 'it runs', len(runs) - len(failed), len(runs), 1.0,
+                          tuple((result, (result.error,)) for result in failed), wall_s)
+        ran = [result for result in runs if not result.error]
+        for place, expected in enumerate(ran[0].expectations if ran else ()):
+            broken = tuple((result, result.broken[place]) for result in ran
+                           if result.broken[place])
+            yield Verdict(game, expected.told(), len(ran) - len(broken), len(ran),
+                          expected.share, broken, wall_s)
+
+
+def junit_xml(verdicts: Sequence[Verdict], name: str) -> bytes:
+    """Return verdicts as JUnit XML, as CI servers read it: a case for each expectation."""
+    bad = sum(not verdict.is_kept for verdict in verdicts)
+    root = ElementTree.Element('testsuites')
+    suite = ElementTree.SubElement(root, 'testsuite', {
+        'name': name, 'tests': str(len(verdicts)), 'failures': str(bad), 'errors': '0'})
+    counted: set[Path] = set()
+    for verdict in verdicts:
+        # The time of the runs is that of all expectations together.
+        wall_s = 0.0 if verdict.game in counted else verdict.wall_s
+        counted.add(verdict.game)
+        case = ElementTree.SubElement(suite, 'testcase', {
+            'classname': str(verdict.game), 'name': verdict.told, 'time': f'{wall_s:.3f}'})
+        lines = broken_lines(verdict)
+        if not verdict.is_kept:
+            failure = ElementTree.SubElement(case, 'failure', {'message': verdict.share()})
+            failure.text = '\n'.join(lines)
+        elif lines:
+            ElementTree.SubElement(case, 'system-out').text = '\n'.join(lines)
+    ElementTree.indent(root)
+    return bytes(ElementTree.tostring(root, encoding='utf-8', xml_declaration=True))
+
+
+def broken_lines(verdict: Verdict) -> list[str]:
+    """Return a line for each vehicle and run that broke an expectation."""
+    return [f'seed {result.case.seed}: {line}' for result, lines in verdict.broken
+            for line in lines]

@@ -1,0 +1,135 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""`crgame test`: games that say what they expect, as tests of a planner."""
+
+import math
+from pathlib import Path
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.expectation import Expectation
+from crgame_ros.game.file import parse_game
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.scenario.export_network import schema_errors
+from crgame_ros.verdict.cases import Case, CaseResult
+from crgame_ros.verdict.judging import check_expectations, shortfalls
+from crgame_ros.verdict.verdicts import verdicts_of
+from lxml import etree
+import pytest
+
+BLIND = """
+import numpy as np
+from crgame_ros.planner.interface import Plan, Planner
+
+
+class Blind(Planner):
+    name = 'blind'
+
+    def setup(self, context):
+        pass
+
+    def plan(self, request):
+        ego, time = request.ego, np.arange(31) * request.time_step_s
+        states = np.tile(ego, (31, 1))
+        states[:, :2] += np.outer(time * ego.speed, (np.cos(ego.yaw), np.sin(ego.yaw)))
+        states[:, 4:] = 0.0
+        return Plan(request.stamp_ns, states)
+"""
+EXPECT = """
+expect:
+  - {measure: collision, at_most: 0}
+  - {vehicle: av0, measure: distance, at_least: 50}
+"""
+
+
+def run(folder: Path, *words: str) -> tuple[int, str, str]:
+    done = subprocess.run([sys.executable, '-m', 'crgame_ros.cli', 'test', *words], cwd=folder,
+                          capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_the_games_of_this_package_keep_what_they_expect(tmp_path: Path) -> None:
+    code, out, told = run(tmp_path, str(scenarios_directory()))
+    assert code == 0, out + told
+    assert out.startswith('14 games, 14 runs: 42 passed, 0 failed in ')
+
+
+def test_a_planner_that_looks_at_nothing_fails(tmp_path: Path) -> None:
+    (tmp_path / 'blind.py').write_text(BLIND)
+    own = scenarios_directory()
+    for name, driver in (('cut_in', 'keys:cut_in.keys.yaml'), ('t_junction', '')):
+        text = (own / f'{name}.yaml').read_text().partition('expect:')[0]
+        text = text.replace('scenario: ', f'scenario: {own}/')
+        text = text.replace(driver, driver.replace(':', f':{own}/')) if driver else text
+        text = text.replace('joy:', f'joy:{own}/')
+        (tmp_path / f'{name}.yaml').write_text(text + EXPECT)
+    words = ('.', '-k', 'cut', '--planner', 'blind.py:Blind', '--seeds', '2')
+    code, out, told = run(tmp_path, *words, '--junit', 'junit.xml')
+    assert code == 1, out + told
+    lines = out.splitlines()
+    assert lines[0] == 'FAILED cut_in.yaml: AVs: collision at most 0: 0 of 2 runs, 0 % (0 to 66 %)'
+    assert lines[1] == '       seed 0: av0: collision is 1'
+    assert lines[-1].startswith('1 game, 2 runs: 1 passed, 1 failed in ')
+    suite = ElementTree.parse(tmp_path / 'junit.xml').getroot()[0]
+    assert {name: suite.get(name) for name in ('tests', 'failures')} == {
+        'tests': '2', 'failures': '1'}
+    failure = suite.find('testcase/failure')
+    assert failure is not None and 'seed 1: av0: collision is 1' in (failure.text or '')
+    failed = tmp_path / 'tests' / 'cut_in-0'
+    assert (failed / 'report.html').stat().st_size > 10_000
+    assert not schema_errors(etree.parse(next(failed.glob('*.xml'))).getroot())
+    assert 'href="cut_in-0/report.html"' in (tmp_path / 'tests' / 'index.html').read_text()
+    # A run that failed is run again from its folder, and only such runs by --rerun-failed.
+    assert run(tmp_path, str(failed / 'game.yaml'), '--out', 'again')[0] == 1
+    code, out, _ = run(tmp_path, '.', '--seeds', '2', '--rerun-failed', '-k', 'cut')
+    assert code == 0 and '1 game, 2 runs: 2 passed, 0 failed' in out
+    code, _, told = run(tmp_path, '.', '--rerun-failed')
+    assert code == 2 and told == ('error: --rerun-failed: nothing is left to run; leave it out\n')
+
+
+def test_what_is_undefined_breaks_nothing_and_a_goal_never_reached_is_late() -> None:
+    rows = [{'vehicle': 'av0', 'role': 'autonomous', 'worst_ttc': None, 'collided': True,
+             'score_reached_s': None, 'score_valid': False},
+            {'vehicle': 'hv0', 'role': 'human', 'worst_ttc': 0.5, 'collided': True}]
+    assert not shortfalls(Expectation('worst_ttc', at_least=1.0), rows)
+    assert shortfalls(Expectation('worst_ttc', 'hv0', at_least=1.0), rows) == [
+        'hv0: worst_ttc is 0.5']
+    assert shortfalls(Expectation('collision', at_most=0.0), rows) == ['av0: collision is 1']
+    assert shortfalls(Expectation('goal_reached_s', at_most=60.0), rows) == [
+        'av0: goal_reached_s is never']
+    assert shortfalls(Expectation('worst_ttc', 'av7', at_least=1.0), rows) == [
+        'there is no av7 in the run']
+
+
+def test_a_share_of_runs_is_enough_and_has_its_interval() -> None:
+    expected = Expectation('worst_ttc', at_least=1.0, share=0.8)
+    results = [CaseResult(Case(Path('g.yaml'), seed), (expected,),
+                          ((('av0: worst_ttc is 0.5',) if seed < 2 else ()),), '', 1.0)
+               for seed in range(10)]
+    verdict, = verdicts_of(results)
+    assert verdict.is_kept and (verdict.good, verdict.runs, verdict.wall_s) == (8, 10, 10.0)
+    # Wilson (1927), eq. 3, with z = 1.95996.
+    z, n, p = 1.959963985, 10, 0.8
+    half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    middle = (p + z * z / (2 * n)) / (1 + z * z / n)
+    assert verdict.interval() == pytest.approx((middle - half, middle + half), rel=1e-6)
+    worse, = verdicts_of([*results[:2], *results[:8]])
+    assert not worse.is_kept
+
+
+@pytest.mark.parametrize(('expected', 'what'), [
+    ({'measure': 'collision'}, 'it has no bound; give at_least or at_most'),
+    ({'measure': 'ttc', 'at_least': 3, 'at_most': 1}, 'at_least 3 is greater than at_most 1'),
+    ({'measure': 'nonsense', 'at_most': 1}, "expect[0]: there is no measure 'nonsense'"),
+    ({'measure': 'collision', 'at_most': 0, 'vehicle': 'av3'},
+     "expect[0]: there is no vehicle 'av3'; these are av0, hv0")])
+def test_an_expectation_that_means_nothing_is_refused(expected: dict[str, object],
+                                                      what: str) -> None:
+    values = {'scenario': str(scenarios_directory() / 'ZAM_CutIn-1_1_T-1.xml'),
+              'humans': [{'id': 'hv0', 'driver': 'idle'}], 'avs': [{'id': 'av0'}],
+              'expect': [expected]}
+    with pytest.raises(InputError) as caught:
+        check_expectations(parse_game(values, 'g.yaml', Path('.')), 'g.yaml')
+    assert what in str(caught.value)
