@@ -203,7 +203,10 @@ def _places(folder: Path) -> dict[str, str]:
     (folder / 'roads.csv').write_text(next(
         block for block in blocks((ROOT / 'docs/roads.md').read_text(), '')
         if block.startswith('lane,x,y')))
-    own = ('roads.csv', 'town.xml', 'town_av.xml', 'circle.csv', 'maps/street', 'somewhere/')
+    (folder / 'district.xodr').write_text(next(
+        blocks((ROOT / 'docs/import.md').read_text(), 'xml')))
+    own = ('district.xodr', 'roads.csv', 'town.xml', 'town_av.xml', 'circle.csv', 'maps/street',
+           'somewhere/')
     return {'my_planner.py:MyPlanner': f'{folder}/my_planner.py:{name.group(1)}',
             'FILE.xml': 'scenarios/ZAM_CutIn-1_1_T-1.xml',
             **{path: f'{folder}/{path}' for path in own}}

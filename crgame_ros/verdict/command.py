@@ -42,8 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add('--workers', type=int, metavar='N', help='processes (default: one for each processor)')
     add('--rerun-failed', action='store_true', help='only what failed the last time')
     add('--junit', type=Path, metavar='FILE.xml', help='write the verdicts as JUnit XML')
-    add('--out', type=Path, metavar='DIR', default=Path('tests'),
-        help='folder for the page, and for the reports of failing runs (default: tests)')
+    add('--out', type=Path, metavar='DIR', default=Path('verdicts'),
+        help='folder for the page, and for the reports of failing runs (default: verdicts)')
     parser.set_defaults(command=run)
 
 
@@ -59,6 +59,9 @@ def run(values: argparse.Namespace) -> int:
     from crgame_ros.verdict.verdicts import broken_lines, junit_xml, verdicts_of
     from crgame_ros.whole_file import write_bytes, write_text
     cases = _cases(values)
+    if not cases:
+        print('nothing failed the last time')
+        return 0
     try:
         values.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -114,9 +117,8 @@ def _cases(values: argparse.Namespace) -> 'list[Case]':
     if values.rerun_failed:
         failed = _last(values.out / LAST)
         cases = [case for case in cases if (str(case.game.resolve()), case.seed) in failed]
-    if not cases:
-        raise InputError('nothing is left to run', '-k' if values.word else '--rerun-failed',
-                         'leave it out')
+    elif not cases:
+        raise InputError('is in the name of no game', '-k', 'give another word')
     return cases
 
 

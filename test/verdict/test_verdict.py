@@ -77,16 +77,17 @@ def test_a_planner_that_looks_at_nothing_fails(tmp_path: Path) -> None:
         'tests': '2', 'failures': '1'}
     failure = suite.find('testcase/failure')
     assert failure is not None and 'seed 1: av0: collision is 1' in (failure.text or '')
-    failed = tmp_path / 'tests' / 'cut_in-0'
+    failed = tmp_path / 'verdicts' / 'cut_in-0'
     assert (failed / 'report.html').stat().st_size > 10_000
     assert not schema_errors(etree.parse(next(failed.glob('*.xml'))).getroot())
-    assert 'href="cut_in-0/report.html"' in (tmp_path / 'tests' / 'index.html').read_text()
+    assert 'href="cut_in-0/report.html"' in (tmp_path / 'verdicts' / 'index.html').read_text()
     # A run that failed is run again from its folder, and only such runs by --rerun-failed.
     assert run(tmp_path, str(failed / 'game.yaml'), '--out', 'again')[0] == 1
     code, out, _ = run(tmp_path, '.', '--seeds', '2', '--rerun-failed', '-k', 'cut')
     assert code == 0 and '1 game, 2 runs: 2 passed, 0 failed' in out
-    code, _, told = run(tmp_path, '.', '--rerun-failed')
-    assert code == 2 and told == ('error: --rerun-failed: nothing is left to run; leave it out\n')
+    assert run(tmp_path, '.', '--rerun-failed') == (0, 'nothing failed the last time\n', '')
+    assert run(tmp_path, '.', '-k', 'none')[2] == (
+        'error: -k: is in the name of no game; give another word\n')
 
 
 def test_what_is_undefined_breaks_nothing_and_a_goal_never_reached_is_late() -> None:
