@@ -72,34 +72,35 @@ def environment_obstacle(number: int, kind: str, parts: Parts, pose: Sequence[fl
 
 
 def dynamic_obstacle(number: int, kind: str, parts: Parts, states: Iterable[Sequence[float]],
-                     driven: bool, signals: Sequence[Sequence[bool]] = ()) -> str:
+                     driven: bool, signals: Sequence[Sequence[bool]] = (), first: int = 0) -> str:
     """
     Return the XML of an obstacle with its trajectory.
 
     :param kind: one of `DYNAMIC_TYPES`
-    :param states: two or more rows from time step 0 on: x, y, yaw of the centre, speed; for a
-        driven vehicle also acceleration, yaw rate, steering angle
+    :param states: two or more rows at consecutive time steps: x, y, yaw of the centre, speed; for
+        a driven vehicle also acceleration, yaw rate, steering angle
     :param driven: whether the rows have the values of a driven vehicle
     :param signals: at each of these steps, in the order of `SIGNALS`, or its first ones; empty if
         unknown
+    :param first: time step of the first row; the schema permits 0 only
     """
     template = _VEHICLE_STATE if driven else _OBJECT_STATE
-    lines = [template.format(*row[:3], step, *row[3:]) for step, row in enumerate(states)]
+    lines = [template.format(*row[:3], step, *row[3:]) for step, row in enumerate(states, first)]
     trajectory = '</state>\n<state>'.join(lines[1:])
-    initial, series = _signal_series(signals)
+    initial, series = _signal_series(signals, first)
     return (f'<dynamicObstacle id="{number}"><type>{kind}</type><shape>{_body(parts)}</shape>\n'
             f'<initialState>{lines[0]}</initialState>\n{initial}'
             f'<trajectory>\n<state>{trajectory}</state>\n</trajectory>{series}'
             '</dynamicObstacle>\n')
 
 
-def _signal_series(signals: Sequence[Sequence[bool]]) -> tuple[str, str]:
+def _signal_series(signals: Sequence[Sequence[bool]], begin: int) -> tuple[str, str]:
     """Return the XML of the first signal state, and of those that follow."""
     if not signals:
         return '', ''
     first, *rest = [_TIME.format(step) + ''.join(
         f'<{name}>{str(on).lower()}</{name}>' for name, on in zip(SIGNALS, row, strict=False))
-        for step, row in enumerate(signals)]
+        for step, row in enumerate(signals, begin)]
     states = '</signalState>\n<signalState>'.join(rest)
     return (f'<initialSignalState>{first}</initialSignalState>\n',
             f'\n<signalSeries>\n<signalState>{states}</signalState>\n</signalSeries>\n')

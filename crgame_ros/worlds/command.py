@@ -34,7 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = DESCRIPTION
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
-    add('source', metavar='FILE|FOLDER', type=Path, help='a map, or the folder of a data set')
+    add('source', metavar='FILE|FOLDER', type=Path,
+        help='a map, the folder of a data set, or the tracks of one recording')
     add('--out', type=Path, metavar='DIR', default=Path('worlds'),
         help='folder of the scenarios (default: worlds)')
     add('--format', metavar='NAME', help='format of the source (default: by its content)')
@@ -42,6 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='scenarios of a data set at most (default: %(default)d)')
     add('--steps', type=int, metavar='N', default=150,
         help='time steps of each (default: %(default)d)')
+    add('--downsample', type=int, metavar='N', default=1,
+        help='take each N-th frame of a data set only (default: %(default)d)')
     add('--timeout', type=float, metavar='S', default=900.0,
         help='that a converter may take (default: %(default)g)')
     add('--no-drive', action='store_true', help='leave the trial drive out')
@@ -62,9 +65,8 @@ def run(values: argparse.Namespace) -> int:
     if not source.exists():
         raise InputError('does not exist', str(source), 'name a file or a folder')
     kind = named_kind(values.format) if values.format else find_kind(source)
-    if source.is_dir() == (kind in MAPS):
-        raise InputError(f'is no {"file" if kind in MAPS else "folder"}', str(source),
-                         f'{kind.label} is one')
+    if source.is_dir() and kind in MAPS:
+        raise InputError('is no file', str(source), f'{kind.label} is one')
     if kind in MAPS:
         _import_map(values, kind)
     else:
@@ -99,16 +101,17 @@ def _import_map(values: argparse.Namespace, kind: 'WorldKind') -> None:
 
 
 def _import_data(values: argparse.Namespace, kind: 'WorldKind') -> None:
-    from crgame_ros.worlds.data_sets import convert_data
-    if values.limit < 1 or values.steps < 10:
-        raise InputError('is too small', '--limit' if values.limit < 1 else '--steps',
-                         'give 1 scenario and 10 time steps or more')
-    _make_folder(values.out)
-    written = convert_data(values.source, kind, values.out, values.limit, values.steps,
-                           values.timeout, _say)
-    for path in written:
-        print(path)
-    print(f'./run.sh --scenario {written[0]}')
+    from crgame_ros.worlds.data_sets import convert_data, DataSetImport
+    for name, least in (('limit', 1), ('steps', 10), ('downsample', 1)):
+        if getattr(values, name) < least:
+            raise InputError('is too small', f'--{name}', f'give {least} or more')
+    order = DataSetImport(values.source, kind, values.out, values.limit, values.steps,
+                          values.downsample, values.timeout, values.force)
+    first = None
+    for path in convert_data(order, _say):
+        print(path, flush=True)
+        first = first or path
+    print(f'./run.sh --scenario {first}')
 
 
 def _make_folder(folder: Path) -> None:
