@@ -42,7 +42,7 @@ class Verdict:
         return self.good >= self.needed * self.runs
 
     def interval(self) -> tuple[float, float]:
-        """Return the 95 % interval (Wilson) of the share of runs that keep it."""
+        """Return the 95 % interval by Wilson of the share of runs that keep it."""
         found = binomtest(self.good, self.runs).proportion_ci(_LEVEL, 'wilson')
         return float(found.low), float(found.high)
 
