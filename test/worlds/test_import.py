@@ -14,6 +14,7 @@ from crgame_ros.scenario.export_network import schema_errors
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.worlds.environments import SUMO_TOOLS
 from crgame_ros.worlds.kinds import find_kind
+from crgame_ros.worlds.lanelet2 import prepare_lanelet2
 from crgame_ros.worlds.local_plane import mercator_degrees, tangent_plane
 from lxml import etree
 from made_maps import lanelet2, opendrive, openstreetmap
@@ -63,28 +64,37 @@ def test_an_opendrive_map_is_driven_on_in_metres(tmp_path: Path) -> None:
     assert len(loaded.planning_problems) == 1
 
 
-@pytest.mark.parametrize('local', [False, True])
-def test_a_lanelet2_map_keeps_its_distances(tmp_path: Path, local: bool) -> None:
+def test_a_lanelet2_map_keeps_its_distances(tmp_path: Path) -> None:
     source = tmp_path / 'lanes.osm'
-    source.write_text(lanelet2(local))
+    source.write_text(lanelet2(False))
     _, network, _, told = imported(source, '--no-drive')
     # Of the ellipsoid at 49.002 degrees: length of 0.002 degrees of a meridian, by its radius
     # a (1 - e^2) / (1 - e^2 sin^2)^1.5 (EPSG guidance note 7-2).
-    length, width = 200.0, 4.0
-    if not local:
-        flattening = 1 / 298.257223563
-        squared = flattening * (2 - flattening)
-        below = 1 - squared * math.sin(math.radians(49.002)) ** 2
-        length = math.radians(0.002) * 6378137 * (1 - squared) / below ** 1.5
-        width = math.radians(0.00005) * 6378137 / below ** 0.5 * math.cos(math.radians(49.002))
+    flattening = 1 / 298.257223563
+    squared = flattening * (2 - flattening)
+    below = 1 - squared * math.sin(math.radians(49.002)) ** 2
+    length = math.radians(0.002) * 6378137 * (1 - squared) / below ** 1.5
+    width = math.radians(0.00005) * 6378137 / below ** 0.5 * math.cos(math.radians(49.002))
     assert [network.line(lanelet).length for lanelet in lanes(network)] == \
         pytest.approx([length] * 4, rel=1e-4)
     assert [network.width_at(lanelet, 0.5 * length) for lanelet in lanes(network)] == \
         pytest.approx([width] * 4, abs=0.003)
     limits = [network.speed_limit(lanelet) for lanelet in lanes(network)]
     assert sorted(limit for limit in limits if limit) == pytest.approx([30 / 3.6, 50 / 3.6])
-    assert ('local_x and local_y' if local else 'metres from 49.002000 N') in told
+    assert 'metres from 49.002000 N' in told
     assert '1 speed limits without a value are left out' in told
+
+
+def test_positions_of_autoware_are_taken_as_they_are() -> None:
+    root = etree.fromstring(lanelet2(True))
+    assert prepare_lanelet2(root, 'a map')[0] == 'positions are local_x and local_y'
+    # As the converter projects them: web Mercator by its definition (EPSG:3857).
+    degrees = np.radians([[float(node.get(name)) for name in ('lat', 'lon')]
+                          for node in root.iterchildren('node')])
+    northing = 6378137.0 * np.log(np.tan(math.pi / 4 + degrees[:, 0] / 2))
+    found = np.stack((6378137.0 * degrees[:, 1], northing), axis=-1)
+    assert found == pytest.approx(np.array([[4.0 * column, 200.0 * row] for column in range(3)
+                                            for row in range(3)]), abs=1e-5)
 
 
 def test_a_sumo_network_keeps_the_programs_of_its_lights(tmp_path: Path) -> None:
