@@ -26,8 +26,8 @@ from crgame_ros.recording.run_formats import (
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.exact_values import exact_value
-from crgame_ros.scenario.export_document import scenario_document
-from crgame_ros.scenario.export_elements import exact_number, goal_state, planning_problem
+from crgame_ros.scenario.export_document import NO_DAY, scenario_document, scenario_header
+from crgame_ros.scenario.export_elements import goal_state, planning_problem
 from crgame_ros.scenario.export_goals import goal_where_it_ended, goals_of
 from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.export_network import used_ids, write_roads
@@ -277,8 +277,7 @@ def _header(log: RunTrajectories, loaded: LoadedScenario, problems: int,
     if given != loaded.benchmark_id:
         notices.append(f'the malformed benchmark id {given[:60]!r} became {benchmark_id}')
     day = original.get('date', '')
-    return {
-        'timeStepSize': exact_number(log.game.scheduler.time_step_s),
-        'commonRoadVersion': '2020a', 'author': original.get('author', ''),
-        'affiliation': original.get('affiliation', ''), 'source': original.get('source', ''),
-        'benchmarkID': benchmark_id, 'date': day if guard.is_date(day) else '1970-01-01'}
+    return scenario_header(
+        benchmark_id, log.game.scheduler.time_step_s, original.get('source', ''),
+        author=original.get('author', ''), affiliation=original.get('affiliation', ''),
+        day=day if guard.is_date(day) else NO_DAY)

@@ -10,21 +10,22 @@ import math
 from pathlib import Path
 import re
 from typing import Any, Literal
-from xml.sax.saxutils import quoteattr
 
-from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.scenario.export_document import (
+    document_text,
+    refuse_invalid,
+    scenario_header,
+)
 from crgame_ros.scenario.export_elements import (
-    exact_number,
     goal_state,
     lanelet_references,
     planning_problem,
 )
-from crgame_ros.scenario.export_network import schema_errors
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.waypoints.lanelets import Bounds, DECIMALS, FloatArray, lane_bounds
 from crgame_ros.waypoints.roads import LaneLinks, MAX_GAP, WaypointRoads
-from lxml import etree
 import numpy as np
 
 # A neighbour's cut within this distance is the counterpart of a cut [m].
@@ -46,7 +47,6 @@ MAX_LENGTH, MAX_LANE_LENGTH = 600e3, 99e3
 _GOAL_STEPS = 6000
 _MAX_SPEED = 100.0
 _LIMIT_SIGN = '274'
-_ERRORS_TOLD = 3
 _ZAMUNDA = re.compile(r'ZAM_[A-Za-z0-9]+-[1-9]\d*_[1-9]\d*_T-[1-9]\d*')
 _HEAD = ('<location><geoNameId>-999</geoNameId><gpsLatitude>999</gpsLatitude>'
          '<gpsLongitude>999</gpsLongitude></location>\n'
@@ -353,7 +353,7 @@ def export_roads(roads: WaypointRoads, name: str, kind: LaneletKind = 'urban',
     benchmark_id = name if _ZAMUNDA.fullmatch(name) else (
         f'ZAM_{re.sub("[^A-Za-z0-9]", "", name)[:40] or "Roads"}-1_1_T-1')
     network = _HEAD.format(kind) + ''.join(lanelets + signs)
-    _refuse_invalid(_document(benchmark_id, network + problem, where))
+    refuse_invalid(_document(benchmark_id, network + problem, where))
     text = _document(benchmark_id, network + (problem if drive is not None else ''), where)
     # Check that the file can be loaded: the loader refuses more than the schema, e.g. large files.
     parse_scenario(text, f'{where} as a scenario')
@@ -429,19 +429,7 @@ def _points(points: FloatArray) -> str:
 
 
 def _document(benchmark_id: str, content: str, source: str) -> str:
-    # The date is constant and the folder left out, so that equal way-points give equal bytes.
+    # The folder is left out, so that equal way-points give equal bytes.
     name = ''.join(letter for letter in Path(source).name if letter.isprintable())
-    header = {'timeStepSize': exact_number(TIME_STEP_S), 'commonRoadVersion': '2020a',
-              'author': '', 'affiliation': '', 'source': f'{name}, made by crgame roads',
-              'benchmarkID': benchmark_id, 'date': '1970-01-01'}
-    attributes = ' '.join(f'{name}={quoteattr(value)}' for name, value in header.items())
-    return (f"<?xml version='1.0' encoding='UTF-8'?>\n<commonRoad {attributes}>\n{content}"
-            '</commonRoad>\n')
-
-
-def _refuse_invalid(text: str) -> None:
-    errors = schema_errors(etree.fromstring(text.encode('utf-8'),
-                                            etree.XMLParser(huge_tree=True)))
-    if errors:
-        raise CrgameError('the scenario would break the CommonRoad schema: '
-                          + '; '.join(errors[:_ERRORS_TOLD]))
+    return document_text(scenario_header(benchmark_id, TIME_STEP_S,
+                                         f'{name}, made by crgame roads'), content)

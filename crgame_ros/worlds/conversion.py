@@ -10,9 +10,8 @@ import tempfile
 
 from crgame_ros.errors import InputError, one_line
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.roads.route import find_route
 from crgame_ros.scenario import guard
-from crgame_ros.scenario.export_document import scenario_document
+from crgame_ros.scenario.export_document import scenario_document, scenario_header
 from crgame_ros.scenario.export_elements import goal_state, lanelet_references, planning_problem
 from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.export_network import used_ids, write_roads
@@ -35,7 +34,6 @@ _FROM_START = 10.0
 _DECLARATION = re.compile(r'<\?xml[^>]*\?>')
 _NAMESPACE = re.compile(r'\sxmlns=("[^"]*"|\'[^\']*\')')
 _NO_WORD = re.compile('[^A-Za-z0-9]')
-_DAY = '1970-01-01'
 
 
 @dataclass(frozen=True)
@@ -130,10 +128,8 @@ def _finished(text: str, source: Path, kind: WorldKind, cycles: list[LightCycle 
     roads = write_roads(loaded, 0, notes)
     ids = IdPool(used_ids(roads.elements), notes)
     problem = _problem(network, ids.fresh(), roads.lanelets)
-    header = {'timeStepSize': str(TIME_STEP_S), 'commonRoadVersion': '2020a', 'author': '',
-              'affiliation': '', 'benchmarkID': f'{loaded.benchmark_id}_1_T-1', 'date': _DAY,
-              'source': one_line(f'{source.name}, {kind.label}, by {DESIGNER.title} and crgame '
-                                 'import')}
+    header = scenario_header(f'{loaded.benchmark_id}_1_T-1', TIME_STEP_S, one_line(
+        f'{source.name}, {kind.label}, by {DESIGNER.title} and crgame import'))
     remarks += [notice.removeprefix(f'{made}: ') for notice in loaded.notices
                 if 'no planning problem' not in notice]
     remarks += road_remarks(network)
@@ -174,7 +170,6 @@ def _problem(network: RoadNetwork, number: int, written: dict[int, int]) -> str:
     first = network.line(chain[0])
     x, y, yaw = network.pose_on(chain[0], min(_FROM_START, 0.5 * first.length))
     limit = network.speed_limit(chain[0]) or _SPEED
-    reached = find_route(network, chain[0], 0.0, frozenset({chain[-1]}), 0.0).goal
-    goal = lanelet_references([written.get(reached or chain[0], reached or chain[0])])
+    goal = lanelet_references([written.get(chain[-1], chain[-1])])
     return planning_problem(number, (x, y, yaw, min(limit, _SPEED), 0.0, 0.0),
                             [goal_state((0, _GOAL_STEPS), goal)])

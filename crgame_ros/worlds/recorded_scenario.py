@@ -11,11 +11,10 @@ from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.exact_values import exact_value
-from crgame_ros.scenario.export_document import scenario_document
+from crgame_ros.scenario.export_document import scenario_document, scenario_header
 from crgame_ros.scenario.export_elements import (
     dynamic_obstacle,
     DYNAMIC_TYPES,
-    exact_number,
     goal_state,
     placed_rectangle,
     planning_problem,
@@ -38,7 +37,6 @@ _TURNING_S = 0.4
 # Around the footprint where the car ended [m], along and across.
 _MARGIN = (10.0, 2.0)
 _SHORTEST = 10
-_DAY = '1970-01-01'
 
 
 @dataclass(frozen=True)
@@ -89,9 +87,9 @@ def recorded_scenario(loaded: LoadedScenario, number: int,
     benchmark_id = str(ScenarioID(False, given.country_id, given.map_name, given.map_id, number,
                                   'T', 1))
     root = guard.parse_hardened(loaded.xml_text, loaded.source)
-    header = {'timeStepSize': exact_number(loaded.time_step_s), 'commonRoadVersion': '2020a',
-              'author': root.get('author', ''), 'affiliation': root.get('affiliation', ''),
-              'source': one_line(source), 'benchmarkID': benchmark_id, 'date': _DAY}
+    header = scenario_header(benchmark_id, loaded.time_step_s, one_line(source),
+                             author=root.get('author', ''),
+                             affiliation=root.get('affiliation', ''))
     return RecordedScenario(benchmark_id, scenario_document(
         header, roads.elements, ''.join(written) + problem, late=True))
 
