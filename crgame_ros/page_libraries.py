@@ -12,7 +12,7 @@ import sys
 import tempfile
 
 from crgame_ros.errors import CrgameError
-from crgame_ros.paths import config_directory, PACKAGE
+from crgame_ros.paths import config_directory, PACKAGE, user_directory
 
 # The files that are kept, by their paths among npm's packages. three.module.js imports
 # three.core.js; Plotly's basic bundle draws lines, bars and points, which is enough here.
@@ -89,8 +89,7 @@ def _folder_name() -> str:
 def _places() -> Iterator[Path]:
     """Yield the folders that may hold the libraries: the environment's, then the user's."""
     yield Path(sys.prefix) / 'share' / PACKAGE
-    home = os.environ.get('XDG_DATA_HOME') or Path.home() / '.local' / 'share'
-    yield Path(home) / PACKAGE
+    yield user_directory('data')
 
 
 def _can_be_written(place: Path) -> bool:

@@ -10,6 +10,7 @@ from pathlib import Path
 import stat
 import sys
 import tempfile
+from typing import Literal
 
 from crgame_ros.errors import CrgameError, InputError
 
@@ -61,6 +62,24 @@ def check_room(folder: Path, size: int = 1 << 20) -> None:
             # Some file systems cannot reserve space.
             if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS):
                 raise
+
+
+def user_directory(kind: Literal['cache', 'config', 'data']) -> Path:
+    """Return this package's folder among the user's, by the XDG base directory specification."""
+    usual = {'cache': '.cache', 'config': '.config', 'data': '.local/share'}[kind]
+    return Path(os.environ.get(f'XDG_{kind.upper()}_HOME') or Path.home() / usual) / PACKAGE
+
+
+def make_folder(folder: Path, remedy: str) -> None:
+    """
+    Make a folder, with those above it, unless it is there.
+
+    :raises InputError: if it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f'cannot be made ({error.strerror})', str(folder), remedy) from error
 
 
 def extra_install(extra: str) -> str:

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.paths import PACKAGE, scenarios_directory
+from crgame_ros.paths import make_folder, scenarios_directory, user_directory
 from crgame_ros.whole_file import write_text
 
 VARIABLE = 'CRGAME_SCENARIOS'
@@ -20,8 +20,7 @@ def is_archive(path: Path) -> bool:
 
 def places_file() -> Path:
     """Return the file that holds the user's places, one a line."""
-    home = os.environ.get('XDG_CONFIG_HOME') or Path.home() / '.config'
-    return Path(home) / PACKAGE / 'scenarios.txt'
+    return user_directory('config') / 'scenarios.txt'
 
 
 def user_places() -> tuple[Path, ...]:
@@ -100,9 +99,5 @@ def drop_place(path: Path) -> Path:
 
 def _write(places: tuple[Path, ...]) -> None:
     file = places_file()
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f'cannot be made ({error.strerror})', str(file.parent),
-                         'set XDG_CONFIG_HOME to a folder that can be written') from error
+    make_folder(file.parent, 'set XDG_CONFIG_HOME to a folder that can be written')
     write_text(''.join(f'{place}\n' for place in places), file)

@@ -9,8 +9,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.errors import InputError
-from crgame_ros.paths import PACKAGE
+from crgame_ros.paths import make_folder, user_directory
 from crgame_ros.whole_file import write_bytes, write_whole
 
 FORMAT = 1
@@ -19,8 +18,7 @@ _DIGITS = 16
 
 def cache_folder() -> Path:
     """Return the folder of indexes and of files out of archives."""
-    home = os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache'
-    return Path(home) / PACKAGE / 'scenarios'
+    return user_directory('cache') / 'scenarios'
 
 
 def load_index(place: Path) -> dict[str, Any]:
@@ -75,11 +73,7 @@ def keep_file(content: bytes, name: str) -> Path:
             return path
     except OSError:
         pass
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f'cannot be made ({error.strerror})', str(path.parent),
-                         'set XDG_CACHE_HOME to a folder that can be written') from error
+    make_folder(path.parent, 'set XDG_CACHE_HOME to a folder that can be written')
     write_bytes(content, path)
     return path
 

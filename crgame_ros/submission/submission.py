@@ -10,6 +10,7 @@ from pathlib import Path
 import zipfile
 
 from crgame_ros.errors import CrgameError, InputError, one_line
+from crgame_ros.paths import make_folder
 from crgame_ros.submission.drives import Drive
 from crgame_ros.submission.solution_of_run import BenchmarkChoice, judged_run, JudgedSolution
 from crgame_ros.whole_file import write_bytes
@@ -128,8 +129,4 @@ def check_archive(path: Path) -> None:
         raise InputError('is no name of an archive', str(path), 'give one that ends in .zip')
     if path.exists():
         raise InputError('is there already', str(path), 'remove it, or name another with --out')
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f'cannot be made ({error.strerror})', str(path.parent),
-                         'name another with --out') from error
+    make_folder(path.parent, 'name another with --out')

@@ -13,6 +13,7 @@ from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import Game
+from crgame_ros.whole_file import write_text
 
 REPORT = 'report.html'
 
@@ -113,8 +114,8 @@ def run_case(case: Case, out: Path) -> CaseResult:
         game = load_game(case.game)
         expectations = game.expect
         check_expectations(game, str(case.game))
-        setup = build_setup(_adapted(game, case))
-        result = run_offline(setup)
+        game = _adapted(game, case)
+        result = run_offline(build_setup(game))
         run = Run(case.name, result=result, scoring='drives')
         rows = vehicle_rows(run, result)
         broken = tuple(tuple(shortfalls(each, rows)) for each in expectations)
@@ -124,7 +125,7 @@ def run_case(case: Case, out: Path) -> CaseResult:
             folder.mkdir(parents=True, exist_ok=True)
             write_report([run], folder / REPORT)
             write_scenario(run.log, folder)
-            (folder / 'game.yaml').write_text(_adapted(game, case).dump())
+            write_text(game.dump(), folder / 'game.yaml')
     except CrgameError as error:
         return CaseResult(case, expectations, (), str(error), time.perf_counter() - began)
     return CaseResult(case, expectations, broken, '', time.perf_counter() - began, folder)

@@ -11,6 +11,7 @@ import time
 from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
+from crgame_ros.paths import make_folder
 
 if TYPE_CHECKING:
     from crgame_ros.verdict.cases import Case, CaseResult
@@ -25,6 +26,8 @@ Run games that say what they expect, and judge them: exit code 0 if every expect
 
 docs/testing.md tells of expectations and of CI."""
 LAST = 'last.json'
+# Lines of an expectation that several runs broke.
+_TOLD = 5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,7 +57,7 @@ def run(values: argparse.Namespace) -> int:
     :return: exit code: 0 if every expectation is kept, else 1.
     :raises InputError: if there is nothing to run, or a file cannot be written.
     """
-    from crgame_ros.verdict.cases import run_cases
+    from crgame_ros.verdict.cases import REPORT, run_cases
     from crgame_ros.verdict.page import write_page
     from crgame_ros.verdict.verdicts import broken_lines, junit_xml, verdicts_of
     from crgame_ros.whole_file import write_bytes, write_text
@@ -62,11 +65,7 @@ def run(values: argparse.Namespace) -> int:
     if not cases:
         print('nothing failed the last time')
         return 0
-    try:
-        values.out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f'cannot be made ({error.strerror})', str(values.out),
-                         'choose another place with --out') from error
+    make_folder(values.out, 'choose another place with --out')
     began = time.perf_counter()
     workers = values.workers or len(os.sched_getaffinity(0))
     results = run_cases(cases, values.out, max(1, workers), _tell)
@@ -78,7 +77,7 @@ def run(values: argparse.Namespace) -> int:
                 print(f'       {line}')
     for result in results:
         if result.folder is not None:
-            print(f'       {result.case.name}: {result.folder / "report.html"}')
+            print(f'       {result.case.name}: {result.folder / REPORT}')
     if values.junit is not None:
         write_bytes(junit_xml(verdicts, 'crgame test'), values.junit)
     page = write_page(verdicts, results, values.out)
@@ -90,10 +89,6 @@ def run(values: argparse.Namespace) -> int:
           f'{len(verdicts) - bad} passed, {bad} failed in {time.perf_counter() - began:.1f} s; '
           f'{page}')
     return 1 if bad else 0
-
-
-# Lines of an expectation that several runs broke.
-_TOLD = 5
 
 
 def _cases(values: argparse.Namespace) -> 'list[Case]':

@@ -21,7 +21,7 @@ _COLUMNS = frozenset(column.name for column in VEHICLES_OF_CELLS.columns
 GOAL_REACHED_S = 'goal_reached_s'
 # The measures of summaries that a vehicle has; that of cells concerns all of them.
 _SUMMARY = frozenset(name for name, measure in MEASURES.items() if measure.column)
-KNOWN = sorted({GOAL_REACHED_S, *_SUMMARY, *_COLUMNS})
+KNOWN = frozenset({GOAL_REACHED_S, *_SUMMARY, *_COLUMNS})
 
 
 def check_expectations(game: Game, where: str) -> None:

@@ -9,6 +9,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
+from crgame_ros.paths import make_folder
 
 if TYPE_CHECKING:
     from crgame_ros.worlds.kinds import WorldKind
@@ -94,7 +95,7 @@ def _import_map(values: argparse.Namespace, kind: 'WorldKind') -> None:
         drive = trial_drive(parse_scenario(made.xml_text, str(out)), made.length,
                             Progress(_say, 'trial drive'))
         told = f'\n{drive.told()}'
-    _make_folder(values.out)
+    make_folder(values.out, 'choose another place with --out')
     write_text(made.xml_text, out)
     print(f'{out}: {made.lanelets} lanelets, {made.length:.0f} m of lane{told}\n'
           f'./run.sh --scenario {out}')
@@ -112,11 +113,3 @@ def _import_data(values: argparse.Namespace, kind: 'WorldKind') -> None:
         print(path, flush=True)
         first = first or path
     print(f'./run.sh --scenario {first}')
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f'cannot be made ({error.strerror})', str(folder),
-                         'choose another place with --out') from error

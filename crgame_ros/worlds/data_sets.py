@@ -5,7 +5,6 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-import os
 from pathlib import Path
 import re
 import subprocess
@@ -18,7 +17,7 @@ from crgame_ros.recording.export import prepare_folder
 from crgame_ros.recording.progress import Progress
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.whole_file import write_text
-from crgame_ros.worlds.environments import DATA_SET_CONVERTER
+from crgame_ros.worlds.environments import converter_variables, DATA_SET_CONVERTER
 from crgame_ros.worlds.kinds import WorldKind
 from crgame_ros.worlds.recorded_scenario import recorded_scenario
 from crgame_ros.worlds.recordings import find_recordings, Recording
@@ -136,14 +135,12 @@ def _windows(program: Path, recording: Recording, order: DataSetImport,
              '--num-time-steps', str(order.steps * order.downsample),
              '--downsample', str(order.downsample), '--obstacles-start-at-zero',
              str(given), str(made), order.kind.name, *recording.words]
-    environment = {name: value for name, value in os.environ.items()
-                   if name not in ('PYTHONPATH', 'PYTHONHOME', 'VIRTUAL_ENV')}
     with log.open('wb') as errors:
         try:
             # The order of sets, and so of some elements, follows from the hashes.
             process = subprocess.Popen(
                 words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors,
-                text=True, cwd=folder, env=environment | {
+                text=True, cwd=folder, env=converter_variables() | {
                     'PYTHONHASHSEED': '0', '_TYPER_STANDARD_TRACEBACK': '1'})
         except OSError as error:
             raise CrgameError(f'{DATA_SET_CONVERTER.title} cannot be run '

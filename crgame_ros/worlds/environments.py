@@ -19,7 +19,7 @@ import subprocess
 import sys
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.paths import config_directory
+from crgame_ros.paths import config_directory, user_directory
 
 # Of a converter and of the making of its environment [s]: a town takes minutes, 1 GB as well.
 _MAKE_S = 3600.0
@@ -88,8 +88,7 @@ SUMO_TOOLS = Converter('sumo', "SUMO's netconvert 1.28.0", 'EPL-2.0', '0.5 GB')
 
 def environments_folder() -> Path:
     """Return the folder of all converters' environments, in the user's cache."""
-    cache = os.environ.get('XDG_CACHE_HOME')
-    return (Path(cache) if cache else Path.home() / '.cache') / 'crgame_ros' / 'converters'
+    return user_directory('cache') / 'converters'
 
 
 def find_uv() -> str:
@@ -114,10 +113,14 @@ def run_converter(words: Sequence[str], folder: Path, what: str, timeout_s: floa
     :return: what it printed.
     :raises InputError: if it fails or takes too long; its last line says why.
     """
-    environment = {name: value for name, value in os.environ.items()
-                   if name not in ('PYTHONPATH', 'PYTHONHOME', 'VIRTUAL_ENV')}
-    environment |= {'QT_QPA_PLATFORM': 'offscreen', 'MPLBACKEND': 'Agg', 'NO_COLOR': '1'}
-    return _run_quietly(words, what, timeout_s, folder, environment)
+    return _run_quietly(words, what, timeout_s, folder, converter_variables() | {
+        'QT_QPA_PLATFORM': 'offscreen', 'MPLBACKEND': 'Agg', 'NO_COLOR': '1'})
+
+
+def converter_variables() -> dict[str, str]:
+    """Return the environment variables of a converter: nothing of this Python environment."""
+    return {name: value for name, value in os.environ.items()
+            if name not in ('PYTHONPATH', 'PYTHONHOME', 'VIRTUAL_ENV')}
 
 
 def _run_quietly(words: Sequence[str], what: str, timeout_s: float, folder: Path | None = None,

@@ -3,6 +3,7 @@
 """Mends what converters get wrong, before the loader's own repairs, and thins the bounds out."""
 
 from collections.abc import Iterable, Sequence
+from copy import deepcopy
 import math
 
 from commonroad.scenario.traffic_sign import TrafficSignIDCountries
@@ -33,7 +34,7 @@ _LIMIT_SIGNS = frozenset(kind.MAX_SPEED.value for kind in TrafficSignIDCountries
                          if hasattr(kind, 'MAX_SPEED'))
 # No limit is greater [m/s].
 _MOST_LIMIT = 100.0
-_SIDES = (('adjacentLeft', 'left'), ('adjacentRight', 'right'))
+_SIDES = ('adjacentLeft', 'adjacentRight')
 
 
 def mend_map(root: etree._Element, cycles: Sequence[LightCycle | None] | None,
@@ -48,7 +49,7 @@ def mend_map(root: etree._Element, cycles: Sequence[LightCycle | None] | None,
     :return: remarks, one line each.
     """
     remarks: list[str] = []
-    lanelets = {lanelet.get('id'): Bounds(lanelet) for lanelet in root.iterchildren('lanelet')}
+    lanelets = {lanelet.get('id'): Bounds.of(lanelet) for lanelet in root.iterchildren('lanelet')}
     _drop_slivers(root, lanelets, remarks)
     _drop_turns(root, lanelets, remarks)
     before = sum(len(bounds.left) for bounds in lanelets.values())
@@ -72,14 +73,18 @@ class Bounds:
     A lanelet with its bounds as arrays.
 
     :param element: of the document.
-    :ivar left: (N, 2) or (N, 3) points [m]
-    :ivar right: likewise, N as well.
+    :param left: (N, 2) or (N, 3) points [m]
+    :param right: likewise, N as well.
     """
 
-    def __init__(self, element: etree._Element) -> None:
-        self.element = element
-        self.left, self.right = (_unfolded(_points(element.find(f'{side}Bound')))
-                                 for side in ('left', 'right'))
+    def __init__(self, element: etree._Element, left: FloatArray, right: FloatArray) -> None:
+        self.element, self.left, self.right = element, left, right
+
+    @classmethod
+    def of(cls, element: etree._Element) -> 'Bounds':
+        """Read a lanelet's bounds; points in the wrong order are put right."""
+        return cls(element, *(_unfolded(_points(element.find(f'{side}Bound')))
+                              for side in ('left', 'right')))
 
     @property
     def center(self) -> FloatArray:
@@ -140,12 +145,12 @@ class Bounds:
         for start, end, number in zip(ends[:-1], ends[1:], numbers, strict=True):
             at = np.unique(np.concatenate((
                 [start], np.arange(math.floor(start) + 1, math.ceil(end)), [end])))
-            part = Bounds(_copy(self.element))
-            part.element.set('id', number)
+            element = deepcopy(self.element)
+            element.set('id', number)
             rows = np.arange(len(along))
-            part.left, part.right = (np.stack([np.interp(at, rows, column) for column in bound.T],
-                                              axis=-1) for bound in (self.left, self.right))
-            made.append(part)
+            made.append(Bounds(element, *(
+                np.stack([np.interp(at, rows, column) for column in bound.T], axis=-1)
+                for bound in (self.left, self.right))))
         return made
 
 
@@ -162,10 +167,6 @@ def _unfolded(points: FloatArray) -> FloatArray:
 
 def _length(points: FloatArray) -> float:
     return float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
-
-
-def _copy(element: etree._Element) -> etree._Element:
-    return etree.fromstring(etree.tostring(element))
 
 
 def _needed(line: FloatArray) -> NDArray[np.bool_]:
@@ -288,7 +289,7 @@ def _beside(number: str, lanelets: dict[str, Bounds]) -> list[str]:
     """Return a lanelet and all that lie beside it, directly or not."""
     found = [number]
     for each in found:
-        found += [ref for tag, _ in _SIDES for link in lanelets[each].element.iterchildren(tag)
+        found += [ref for tag in _SIDES for link in lanelets[each].element.iterchildren(tag)
                   if (ref := link.get('ref')) in lanelets and ref not in found]
     return found
 
@@ -304,7 +305,7 @@ def _link_part(element: etree._Element, at: int, numbers: dict[str, list[str]]) 
             for link in links:
                 element.remove(link)
             element.insert(place, etree.Element(tag, ref=chain[other]))
-    for tag, _ in _SIDES:
+    for tag in _SIDES:
         for link in element.findall(tag):
             beside = numbers[link.get('ref')]
             same = link.get('drivingDir') == 'same'

@@ -13,6 +13,8 @@ import re
 import subprocess
 import sys
 
+from crgame_ros.paths import user_directory
+
 _PACKAGE = Path(__file__).resolve().parents[2]
 _HERE = _PACKAGE / 'traffic'
 _IMPORT = re.compile(r'^from (crgame_ros\.(?:traffic|vehicle)(?:\.\w+)+) import', re.MULTILINE)
@@ -27,7 +29,7 @@ def cache_root() -> Path:
     beside = _HERE / '__pycache__'
     if os.access(beside if beside.exists() else _HERE, os.W_OK):
         return beside
-    return Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache') / 'crgame_ros'
+    return user_directory('cache')
 
 
 @cache
