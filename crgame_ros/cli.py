@@ -56,6 +56,8 @@ TOOLS = (
           'crgame_ros.submission.command'),
     _Tool('test', 'games that say what they expect, as tests of a planner',
           'crgame_ros.verdict.command'),
+    _Tool('search', 'the variants of a game in which a planner does worst',
+          'crgame_ros.search.command'),
     _Tool('study', 'experiments with people: plan them, and find mistakes',
           'crgame_ros.study.conduct.study_command'),
     _Tool('validate', 'whether files are valid: scenarios, games, recordings, tables',

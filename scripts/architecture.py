@@ -28,7 +28,7 @@ AT_THE_TOP = {'cli', 'doctor', 'models_command', 'new_command', 'page_libraries_
               'replay_command', 'schema_command'}
 FOLDERS = (
     LOWEST, 'schema', 'library', 'geometry', 'vehicle', 'game', 'roads', 'scenario', 'waypoints',
-    'occupancy', 'scripted', 'messages', 'driver', 'timing', 'drivability', 'control',
+    'variation', 'occupancy', 'scripted', 'messages', 'driver', 'timing', 'drivability', 'control',
     'planner', 'perception', 'policy', 'traffic/compiling', 'traffic/lanes', 'traffic/fleet',
     'traffic/motion', 'traffic/following', 'traffic/crossing', 'traffic/changing', 'traffic',
     'simulation', 'recording', 'worlds', 'analysis/criticality', 'analysis/behaviour',
@@ -36,7 +36,7 @@ FOLDERS = (
     'analysis',
     'evaluation/results', 'evaluation/summary', 'evaluation', 'study', 'study/data', 'cockpit',
     'cockpit/runs', 'study/desk', 'gym', 'ros', 'nodes/sim', 'nodes/cockpit', 'nodes/markers',
-    'nodes', 'launcher', 'submission', 'verdict', 'study/conduct', 'reproduction',
+    'nodes', 'launcher', 'submission', 'verdict', 'search', 'study/conduct', 'reproduction',
     'python_interface', HIGHEST)
 BEGIN, END = '<!-- folders: begin -->', '<!-- folders: end -->'
 # Of the picture [px].

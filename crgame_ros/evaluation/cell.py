@@ -13,6 +13,7 @@ from crgame_ros.evaluation.content import digests_in
 from crgame_ros.evaluation.results.cell_rows import FACTORS
 
 KEY_DIGITS = 32
+_LATER = ('participant', 'variant')
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class Condition:
     :param commonroad_scores: whether CommonRoad's tools score it, too.
     :param code: digests of the engine's and the planners' code.
     :param participant: label of the study's participant who drove the recorded run, or empty.
+    :param variant: the values that vary in the game, as JSON, or empty.
     """
 
     scenario: str
@@ -55,6 +57,7 @@ class Condition:
     commonroad_scores: bool
     code: tuple[str, ...]
     participant: str = ''
+    variant: str = ''
 
     @cached_property
     def text(self) -> str:
@@ -64,9 +67,9 @@ class Condition:
     @cached_property
     def around_seed(self) -> tuple[str, str]:
         """Return what comes before and after the seed in a cell's JSON, with sorted keys."""
-        # Without a participant the keys are those of evaluations that did not know participants.
+        # Without a value, the keys are those of evaluations that did not know the factor.
         known = sorted(item.name for item in fields(self)
-                       if self.participant or item.name != 'participant')
+                       if item.name not in _LATER or getattr(self, item.name))
         names = [[name for name in known if (name > 'seed') is after] for after in (False, True)]
         before, after = (json.dumps({name: getattr(self, name) for name in part}, sort_keys=True,
                                     separators=(',', ':'), allow_nan=True) for part in names)
@@ -121,7 +124,8 @@ class Cell(NamedTuple):
         """Return a name for people."""
         given = self.condition
         place = given.human or given.game or given.scenario
-        more = [text for text in (given.perception, given.traffic) if text != 'own']
+        more = [text for text in (given.perception, given.traffic, given.variant)
+                if text not in ('own', '')]
         return ' · '.join((place, given.planner, *more, f'seed {self.seed}'))
 
 

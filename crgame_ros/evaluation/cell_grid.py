@@ -5,6 +5,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, Self
 
@@ -23,12 +24,15 @@ from crgame_ros.evaluation.cell_scene import (
     with_contents,
 )
 from crgame_ros.evaluation.content import ContentStore
-from crgame_ros.evaluation.plan import EvaluationPlan
+from crgame_ros.evaluation.plan import EvaluationPlan, VariantChoice
 from crgame_ros.evaluation.source_digest import engine_digest, planner_digest
+from crgame_ros.game.variation_spec import VARY
 from crgame_ros.library.lookup import find_scenarios
 from crgame_ros.planner.registry import create_planner, EXTERNAL
 from crgame_ros.schema.writing import write
 from crgame_ros.simulation.av_assignment import OWN
+from crgame_ros.variation.sampling import sample
+from crgame_ros.variation.space import space_of
 
 
 @dataclass(frozen=True)
@@ -73,22 +77,24 @@ class CellGrid:
     engine: str
 
     def __len__(self) -> int:
-        return len(self.scenes) * len(self.planners) * len(self.perception) \
-            * len(self.traffic) * len(self.seeds)
+        return sum(max(1, len(scene.variants)) for scene in self.scenes) * len(self.planners) \
+            * len(self.perception) * len(self.traffic) * len(self.seeds)
 
     def __iter__(self) -> Iterator[Cell]:
         """Yield the cells of a scene together, so that its contents are sent once."""
         for scene in self.scenes:
-            for planner in self.planners:
-                for perception, seen in self.perception.items():
-                    for traffic, flow in self.traffic.items():
-                        condition = Condition(
-                            scene.scenario, scene.game, scene.human, planner.label, perception,
-                            traffic, scene.values, scene.inputs,
-                            planner.choice, seen, flow, self.duration_s, self.latency_steps,
-                            self.commonroad_scores, (self.engine, *self._code(scene, planner)),
-                            scene.participant)
-                        yield from (Cell(condition, seed) for seed in self.seeds)
+            for variant, values in scene.cells():
+                yield from self._cells(scene, variant, values)
+
+    def _cells(self, scene: CellScene, variant: str, values: dict[str, object]) -> Iterator[Cell]:
+        for planner, (perception, seen), (traffic, flow) in product(
+                self.planners, self.perception.items(), self.traffic.items()):
+            condition = Condition(
+                scene.scenario, scene.game, scene.human, planner.label, perception, traffic,
+                values, scene.inputs, planner.choice, seen, flow, self.duration_s,
+                self.latency_steps, self.commonroad_scores,
+                (self.engine, *self._code(scene, planner)), scene.participant, variant)
+            yield from (Cell(condition, seed) for seed in self.seeds)
 
     def _code(self, scene: CellScene, planner: GridPlanner) -> tuple[str, ...]:
         return (planner.digest,) if planner.choice is not None else scene.digests
@@ -101,7 +107,8 @@ class CellGrid:
     def from_dict(cls, values: dict[str, Any]) -> Self:
         """Build the grid from the dictionary of `as_dict`."""
         return cls(**values | {
-            'scenes': tuple(CellScene(**scene | {'digests': tuple(scene['digests'])})
+            'scenes': tuple(CellScene(**scene | {
+                name: tuple(scene.get(name, ())) for name in ('digests', 'variants')})
                             for scene in values['scenes']),
             'planners': tuple(GridPlanner(**planner) for planner in values['planners']),
             'seeds': tuple(values['seeds'])})
@@ -133,7 +140,7 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
         scene = make(path, store)
         if not scene.digests:
             raise InputError('no AV takes part', str(path), 'leave it out, or name AVs in a game')
-        scenes.append(scene)
+        scenes.append(with_variants(scene, plan.variants, path))
         progress((number + 1) / len(places))
     paths = [path for _, path in places]
     scenes = [replace(scene, participant=label) if scene.human else scene
@@ -141,6 +148,20 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
     return CellGrid(_unique_names(scenes, paths), planners, perception, traffic,
                     plan.seed_numbers(), plan.duration, plan.latency, plan.commonroad_scores,
                     engine_digest())
+
+
+def with_variants(scene: CellScene, wanted: VariantChoice | None, path: Path) -> CellScene:
+    """
+    Return a scene with its variants sampled; unchanged if none are wanted or nothing varies.
+
+    :param path: path of its file.
+    :raises InputError: if what varies cannot be used.
+    """
+    if wanted is None or not scene.values.get(VARY):
+        return scene
+    space = space_of(scene.values, str(path))
+    return replace(scene, variants=tuple(
+        sample(space, wanted.sampling, wanted.number, wanted.seed, str(path))))
 
 
 def _unique_names(scenes: Sequence[CellScene], paths: Sequence[Path]) -> tuple[CellScene, ...]:

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scene of a cell: a game with all files that it names, ready for transfer to workers."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 import io
+import json
 import os
 from pathlib import Path
 import re
@@ -16,6 +17,7 @@ from crgame_ros.evaluation.content import Content, ContentStore
 from crgame_ros.evaluation.source_digest import code_neighbours, MOST_BYTES, planner_digest
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import Game
+from crgame_ros.game.variation_spec import Dimension, EXPECT, VARY
 from crgame_ros.occupancy.map_file import read_map_file
 from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.recorded_game import read_recorded_game
@@ -26,6 +28,7 @@ from crgame_ros.scenario import guard
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.writing import write
 from crgame_ros.simulation.av_assignment import assign_avs
+from crgame_ros.variation.space import space_of
 import numpy as np
 
 # Text for people can look like a file's name without being one.
@@ -33,6 +36,7 @@ _FOR_PEOPLE = ('title', 'label', 'name')
 # Drivers that need no person: without a page, `auto` is an idle driver.
 _DRIVES_ALONE = ('idle', 'auto')
 _FILE = re.compile(r'([a-z]+:)?(/[^\0]+?)(:[A-Za-z_]\w*)?')
+_RELATIVE = re.compile(r'([a-z]+:)?([^\0:]+)(:[A-Za-z_]\w*)?')
 INPUTS = 'inputs.npz'
 SCENARIO_SUFFIXES, GAME_SUFFIXES = ('.xml',), ('.yaml', '.yml')
 
@@ -49,6 +53,7 @@ class CellScene:
     :param values: values of the game, as in its file; files are references to contents.
     :param inputs: digest of the recorded humans' inputs; empty without recorded humans.
     :param digests: digests of the code of its AVs' planners.
+    :param variants: values of what varies in it; none runs the game as it is.
     """
 
     scenario: str
@@ -58,11 +63,22 @@ class CellScene:
     inputs: str
     digests: tuple[str, ...]
     participant: str = ''
+    variants: tuple[Mapping[str, object], ...] = ()
 
     @property
     def label(self) -> str:
         """Return a name for people, unique in an evaluation."""
         return self.human or self.game or self.scenario
+
+    def cells(self) -> Iterator[tuple[str, dict[str, object]]]:
+        """Yield each variant as JSON, with the values of its game; one empty if none varies."""
+        if not self.variants:
+            yield '', {key: value for key, value in self.values.items()
+                       if key not in (VARY, EXPECT)}
+            return
+        space = space_of(self.values, self.label)
+        for variant in self.variants:
+            yield variant_text(variant), space.game_values(variant)
 
 
 def scene_of_game(path: Path, store: ContentStore) -> CellScene:
@@ -79,7 +95,23 @@ def scene_of_game(path: Path, store: ContentStore) -> CellScene:
                              f'{path}: {human.id}', 'use keys:FILE, joy:FILE or idle, or name '
                              'recorded runs under "humans"')
     loaded = load_scenario(game.scenario)
-    return _scene(game, loaded, store, game_name=path.stem)
+    vary = tuple(replace(entry, values=tuple(_absolute(value, game.base)
+                                             for value in entry.values))
+                 if isinstance(entry, Dimension) else entry for entry in game.vary)
+    return _scene(replace(game, vary=vary), loaded, store, game_name=path.stem)
+
+
+def _absolute(value: object, base: Path) -> object:
+    """Return a possible value of a key, its file's name absolute."""
+    match = _RELATIVE.fullmatch(value) if isinstance(value, str) else None
+    if match is None or not (base / match[2]).is_file():
+        return value
+    return f'{match[1] or ""}{(base / match[2]).resolve()}{match[3] or ""}'
+
+
+def variant_text(variant: Mapping[str, object]) -> str:
+    """Return the values of a variant as JSON."""
+    return json.dumps(dict(variant), separators=(', ', ': '), sort_keys=True)
 
 
 def scene_of_scenario(path: Path, store: ContentStore) -> CellScene:

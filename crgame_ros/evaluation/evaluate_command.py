@@ -8,12 +8,14 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import Any, get_args, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.folder import EvaluationFolder, REPORTS
+from crgame_ros.evaluation.file_names import GRID_FILE, REPORTS, SEARCH_FILE
+from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.evaluation.summary.command import add_summary_arguments
+from crgame_ros.game.variation_spec import Sampling
 from crgame_ros.library.lookup import names_file
 from crgame_ros.paths import find_game
 from crgame_ros.schema.marks import named_file
@@ -85,6 +87,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='files with "perception" of all AVs; "own" is that of the games')
     add('--traffic', nargs='+', default=[], metavar='FILE',
         help='files with "traffic"; "own" is that of the games')
+    add('--variants', type=int, metavar='N', help='run N variants of each game with `vary`')
+    add('--sampling', choices=get_args(Sampling), help='how they are chosen (default: sobol)')
     add('--duration', type=float, metavar='S', help='simulated seconds of each cell')
     add('--latency', type=int, metavar='L', help='simulation steps between a request and its plan')
     add('--commonroad-scores', action='store_true',
@@ -145,7 +149,13 @@ def _inspect(values: argparse.Namespace) -> int:
     if values.cell:
         print(report_cell(values.plan, values.cell, partial(print, file=sys.stderr, flush=True)))
         return 0
-    return summarise_command(values.plan, values)
+    code = summarise_command(values.plan, values)
+    grid = EvaluationFolder(values.plan).grid() if (values.plan / GRID_FILE).exists() else None
+    if grid is not None and any(scene.variants for scene in grid.scenes):
+        from crgame_ros.evaluation.variant_results import write_variant_pages
+        for page in write_variant_pages(values.plan, grid, values.measure or ()):
+            print(page, file=sys.stderr)
+    return code
 
 
 def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
@@ -164,6 +174,9 @@ def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
         if given:
             raise InputError('an evaluation goes on as it was planned', f'--{next(iter(given))}',
                              'change its plan file instead, or name another --out')
+        if (values.plan / SEARCH_FILE).exists():
+            raise InputError('is of a search', str(values.plan),
+                             f'go on with it: crgame search {values.plan}')
         place = EvaluationFolder(values.plan)
         return parse_plan(place.plan_values(), str(values.plan), place.base), values.plan
     base = values.plan.parent
@@ -201,6 +214,10 @@ def _given(values: argparse.Namespace) -> dict[str, Any]:
         if files:
             given[name] = {Path(file).stem: file if file == 'own' else
                            str(Path(file).expanduser().resolve()) for file in files}
+    variants = {name: value for name, value in (
+        ('number', values.variants), ('sampling', values.sampling)) if value is not None}
+    if variants:
+        given['variants'] = variants
     for name in ('duration', 'latency'):
         if getattr(values, name) is not None:
             given[name] = getattr(values, name)

@@ -124,7 +124,7 @@ def _compute(grid: CellGrid, finished: set[bytes], parts: ResultParts, store: Co
         tally.threads = batches.threads
         told(tally, None, None)
         for ended in batches.results():
-            rows = [_rows_of(cell, found) for cell, found in ended]
+            rows = [rows_of(cell, found) for cell, found in ended]
             parts.add(*rows)
             for (cell, _), row in zip(ended, rows, strict=True):
                 tally.done += 1
@@ -132,8 +132,12 @@ def _compute(grid: CellGrid, finished: set[bytes], parts: ResultParts, store: Co
                 told(tally, cell, row['cell'])
 
 
-def _rows_of(cell: Cell, found: dict[str, Any]) -> dict[str, Any]:
-    """Return the rows of a cell with all columns that identify it."""
+def rows_of(cell: Cell, found: dict[str, Any]) -> dict[str, Any]:
+    """
+    Return the rows of a cell with all columns that identify it.
+
+    :param found: its rows, as `cell_run.compute_cell` returns them.
+    """
     own = {'cell': cell.key, **cell.factors}
     return {CELLS.name.removesuffix('s'): own | found['cell'],
             'vehicles': [vehicle | own for vehicle in found['vehicles']],

@@ -12,6 +12,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_grid import CellGrid
 from crgame_ros.evaluation.content import ContentStore
+from crgame_ros.evaluation.file_names import FILES, GRID_FILE
 from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
 from crgame_ros.recording.export import prepare_folder
@@ -19,7 +20,6 @@ from crgame_ros.schema.writing import write
 from crgame_ros.version import __version__
 from crgame_ros.whole_file import write_text
 
-GRID_FILE, FILES, REPORTS = 'evaluation.json', 'files', 'reports'
 FORMAT = 1
 
 
@@ -46,16 +46,24 @@ class EvaluationFolder:
         if any(self.path.iterdir()) and not (self.path / GRID_FILE).exists() \
                 and {item.name for item in self.path.iterdir()} - {FILES}:
             raise InputError('something else is in it', str(self.path), 'name another folder')
-        note = {'format': FORMAT, 'version': __version__, 'plan': write(plan),
-                'base': str(plan.base.resolve()),
-                'grid': grid.as_dict()}
-        write_text(json.dumps(note, indent=1) + '\n', self.path / GRID_FILE)
+        self.write_grid(plan, grid)
         package = {
             '$schema': PROFILE.format('datapackage'),
             'name': 'evaluation', 'description': 'Cells of an evaluation; SI units and radians.',
             'resources': [_resource(table) for table in TABLES_OF_CELLS]}
         write_text(json.dumps(package, indent=1, ensure_ascii=False) + '\n',
                    self.path / PACKAGE_FILE)
+
+    def write_grid(self, plan: EvaluationPlan, grid: CellGrid) -> None:
+        """
+        Write the plan and the grid over those of before.
+
+        :raises InputError: if the folder cannot be written.
+        """
+        note = {'format': FORMAT, 'version': __version__, 'plan': write(plan),
+                'base': str(plan.base.resolve()),
+                'grid': grid.as_dict()}
+        write_text(json.dumps(note, indent=1) + '\n', self.path / GRID_FILE)
 
     def find(self, key: str) -> Cell:
         """

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar
 from crgame_ros.errors import InputError
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.game.variation_spec import MOST_VARIANTS, Sampling
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Advice, Folder, Listed, Named, Within
 from crgame_ros.schema.reading import read
@@ -44,6 +45,23 @@ class PlannerChoice:
 
 
 @dataclass(frozen=True)
+class VariantChoice:
+    """
+    The variants of games with `vary`.
+
+    :param number: of variants of each game; a grid has as many as its levels give.
+    :param sampling: how they are chosen.
+    :param seed: of the choice.
+    """
+
+    FORM: ClassVar[Form] = Form('give number and sampling', short='sampling')
+
+    number: Annotated[int, Within(1, MOST_VARIANTS)] = 64
+    sampling: Sampling = 'sobol'
+    seed: Annotated[int, Within(0, 2**63 - 1)] = 0
+
+
+@dataclass(frozen=True)
 class EvaluationPlan:
     """
     The plan of an evaluation: each scene is combined with each value of all other keys.
@@ -56,6 +74,7 @@ class EvaluationPlan:
     :param seeds: number of seeds, from 0 on, or a list of seeds.
     :param perception: perception of the AVs, by label; `own` is that of the games.
     :param traffic: traffic by label; `own` is that of the games.
+    :param variants: which variants of games with `vary` are run; by default each game as it is.
     :param duration: simulated duration of each cell [s]; by default that of the game or the
         recording, or 20 s if these have none.
     :param latency: simulation steps between a request and its plan.
@@ -74,6 +93,7 @@ class EvaluationPlan:
     seeds: object = 1
     perception: dict[str, object] = field(default_factory=dict)
     traffic: dict[str, object] = field(default_factory=dict)
+    variants: VariantChoice | None = None
     duration: Annotated[float, Within(0.0, 86400.0)] | None = None
     latency: Annotated[int, Within(0, 1_000_000)] = 0
     commonroad_scores: bool = False

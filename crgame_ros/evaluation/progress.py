@@ -76,13 +76,15 @@ def _line(tally: EvaluationTally, passed_s: float, bar: bool) -> str:
     filled = round(share * BAR)
     drawn = f'[{"#" * filled}{"." * (BAR - filled)}] ' if bar else ''
     speed = tally.done / passed_s if passed_s > 0.0 else 0.0
-    left = f', {_duration((tally.total - ended) / speed)} left' if speed and ended < tally.total \
-        else ''
+    left = ''
+    if speed and ended < tally.total:
+        left = f', {duration_text((tally.total - ended) / speed)} left'
     failed = f', {tally.failed} failed' if tally.failed else ''
     return f'{drawn}{ended} of {tally.total} cells, {speed:.2f} cells/s{left}{failed}'
 
 
-def _duration(time_s: float) -> str:
+def duration_text(time_s: float) -> str:
+    """Return a time in words for people."""
     if time_s < 90.0:
         return f'{time_s:.0f} s'
     return f'{time_s / 60.0:.0f} min' if time_s < 5400.0 else f'{time_s / 3600.0:.1f} h'

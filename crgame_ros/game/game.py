@@ -14,6 +14,7 @@ from crgame_ros.game.object_spec import ObjectList
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.task_spec import TaskList
 from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.game.variation_spec import named_uniquely, VariationList
 from crgame_ros.library.lookup import find_scenario
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import (
@@ -318,6 +319,8 @@ class Game:
     :param environment: light and air in the displayed world.
     :param tasks: tasks that drivers answer or do besides driving.
     :param expect: what a run has to keep, for `crgame test`.
+    :param vary: what may vary, for `crgame evaluate` and `crgame search`; a run without them takes
+        the values as they are.
     :param language: of the texts for drivers during the drive, if the page's address names none.
     """
 
@@ -344,6 +347,7 @@ class Game:
     environment: EnvironmentSpec | None = None
     tasks: Annotated[TaskList, LeftOut()] = ()
     expect: Annotated[ExpectationList, LeftOut()] = ()
+    vary: Annotated[VariationList, LeftOut()] = ()
     language: Annotated[Literal['en', 'de'], LeftOut()] = 'en'
 
     def _repr_html_(self) -> str:
@@ -361,7 +365,8 @@ class Game:
         return yaml.safe_dump(write(self, self.base), sort_keys=False, allow_unicode=True)
 
     def check(self) -> None:
-        """Refuse more than `MAX_VEHICLES` vehicles."""
+        """Refuse more than `MAX_VEHICLES` vehicles, and two entries that vary one thing."""
+        named_uniquely(self.vary)
         count = len(self.humans) + len(self.avs or ())
         if count > MAX_VEHICLES:
             raise InputError(f'{count} humans and AVs', '', f'have {MAX_VEHICLES} at most')

@@ -15,7 +15,8 @@ from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_run import run_cell
 from crgame_ros.evaluation.cell_scene import files_of, runs_of, SCENARIO_SUFFIXES
-from crgame_ros.evaluation.folder import EvaluationFolder, GRID_FILE
+from crgame_ros.evaluation.file_names import GRID_FILE
+from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.game.game import AvSpec, DEFAULT_PLANNER, Game
 from crgame_ros.library.lookup import find_scenarios, names_file
 from crgame_ros.planner.registry import create_planner, EXTERNAL

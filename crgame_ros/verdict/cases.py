@@ -103,11 +103,11 @@ def run_case(case: Case, out: Path) -> CaseResult:
     # Imported here: the process that only hands cases out does not need them.
     from crgame_ros.analysis.report.file import write_report
     from crgame_ros.analysis.runs.run import Run
+    from crgame_ros.evaluation.judging import check_expectations, shortfalls
     from crgame_ros.evaluation.results.cell_rows import vehicle_rows
     from crgame_ros.recording.export import write_scenario
     from crgame_ros.simulation.offline import run_offline
     from crgame_ros.simulation.setup import build_setup
-    from crgame_ros.verdict.judging import check_expectations, shortfalls
     began = time.perf_counter()
     expectations: tuple[Expectation, ...] = ()
     try:

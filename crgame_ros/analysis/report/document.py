@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import hashlib
 import re
 
-from crgame_ros.analysis.report.plot_data import plot_data
+from crgame_ros.analysis.report.plot_data import plot_data, script_json
 from crgame_ros.analysis.report.section import Plot, Section
 from crgame_ros.analysis.report.text import free, plain
 from crgame_ros.page_libraries import plotly_script
@@ -77,6 +77,8 @@ class Page:
     :param articles: its content.
     :param footer: HTML.
     :param style: style rules in addition to those of all pages.
+    :param script: its own script, as a path in the folder of pages (TypeScript).
+    :param data: JSON-compatible values that this script reads.
     """
 
     title: str
@@ -85,6 +87,8 @@ class Page:
     articles: Sequence[Article]
     footer: str = ''
     style: str = ''
+    script: str = ''
+    data: object = None
 
     def html(self) -> str:
         """
@@ -104,6 +108,12 @@ class Page:
                  for section in article.sections for plot in section.plots]
         page = page_directory() / 'report'
         style = f'{(page / "report.css").read_text(encoding="utf-8")}\n{self.style}'
+        if self.script:
+            script = strip_types((page_directory() / self.script).read_bytes(),
+                                 self.script).decode()
+            return _document(self.title, (style,), '', '\n'.join((
+                body, f'<script id="data" type="application/json">{script_json(self.data)}'
+                f'</script>', f'<script>{script}</script>')), (script,))
         if not plots:
             return _document(self.title, (style,), '', body, ())
         script = strip_types((page / 'report.ts').read_bytes(), 'report.ts').decode()

@@ -29,6 +29,8 @@ _FACTORS = (
            empty='no recorded human drives'),
     Column('participant', TEXT, '', "the study's participant who drove that run",
            empty='the run is not of a study'),
+    Column('variant', TEXT, '', 'values of what varies in the game, as a JSON object',
+           empty='the game is run as it is'),
     Column('planner', TEXT, '', 'label of the planner or driver of the AVs'),
     Column('perception', TEXT, '', 'label of how AVs perceive'),
     Column('traffic', TEXT, '', 'label of the traffic'),

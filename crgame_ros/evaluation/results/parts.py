@@ -270,6 +270,27 @@ def newest_parts(folder: Path) -> Mapping[str, pa.Buffer]:
     return parts
 
 
+def stored_rows(folder: Path) -> Iterator[tuple[dict[str, Any], list[dict[str, Any]]]]:
+    """
+    Yield the row of each finished cell, with the rows of its vehicles.
+
+    :raises InputError: if a part is damaged.
+    """
+    newest = newest_parts(folder)
+    parts: list[tuple[pa.Table, pa.Table]] = [
+        (_read(folder / CELLS.name / name), _read(folder / VEHICLES_OF_CELLS.name / name))
+        for name in _part_names(folder)]
+    if newest:
+        cells, vehicles = (pq.read_table(pa.BufferReader(newest[table.name]))
+                           for table in (CELLS, VEHICLES_OF_CELLS))
+        parts.append((cells, vehicles))
+    for cells, vehicles in parts:
+        by_cell: dict[str, list[dict[str, Any]]] = {}
+        for row in vehicles.to_pylist():
+            by_cell.setdefault(row['cell'], []).append(row)
+        yield from ((row, by_cell.get(row['cell'], [])) for row in cells.to_pylist())
+
+
 def _journal_number(path: Path) -> int:
     return int(path.stem.rpartition('-')[2])
 

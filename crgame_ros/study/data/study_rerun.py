@@ -107,7 +107,7 @@ def _evaluated(trials: Sequence[CountedTrial], planners: Sequence[str], seed: in
     """Run or resume the evaluation; return its names of the recorded runs."""
     from crgame_ros.evaluation.dask_cluster import default_workers
     from crgame_ros.evaluation.evaluation import Computing, evaluate
-    from crgame_ros.evaluation.folder import GRID_FILE
+    from crgame_ros.evaluation.file_names import GRID_FILE
     from crgame_ros.evaluation.plan import parse_plan
     from crgame_ros.evaluation.progress import EvaluationProgress
     humans = [str(trial.attempt.folder.resolve()) for trial in trials

@@ -3,6 +3,7 @@
 """Judges a run by the expectations of its game."""
 
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 import math
 
 from crgame_ros.analysis.tables.column import FLAG, INTEGER, NUMBER
@@ -12,6 +13,8 @@ from crgame_ros.evaluation.summary.measures import MEASURES
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.game import Game
 from crgame_ros.game.objects import Role
+from crgame_ros.game.variation_spec import EXPECT
+from crgame_ros.schema.reading import read
 import numpy as np
 
 Row = Mapping[str, object]
@@ -21,6 +24,8 @@ _COLUMNS = frozenset(column.name for column in VEHICLES_OF_CELLS.columns
 GOAL_REACHED_S = 'goal_reached_s'
 # The measures of summaries that a vehicle has; that of cells concerns all of them.
 _SUMMARY = frozenset(name for name, measure in MEASURES.items() if measure.column)
+# Criticality measures may be named without what makes them one value.
+_WORST = 'worst_'
 KNOWN = frozenset({GOAL_REACHED_S, *_SUMMARY, *_COLUMNS})
 
 
@@ -34,15 +39,39 @@ def check_expectations(game: Game, where: str) -> None:
     vehicles = {human.id for human in game.humans} | {av.id for av in game.avs or ()}
     for number, expected in enumerate(game.expect):
         place = f'{where}: expect[{number}]'
-        if expected.measure not in KNOWN:
-            raise InputError(f'there is no measure {expected.measure[:60]!r}', place,
-                             'name one of docs/testing.md, or a numeric column of the table '
-                             'vehicles')
+        known_measure(expected.measure, place)
         # AVs that the scenario alone names are not known yet.
         if expected.vehicle is not None and game.avs is not None \
                 and expected.vehicle not in vehicles:
             raise InputError(f'there is no vehicle {expected.vehicle[:40]!r}', place,
                              f'these are {", ".join(sorted(vehicles))}')
+
+
+def expectations_of(values: Mapping[str, object], where: str) -> tuple[Expectation, ...]:
+    """
+    Return what a game expects; without a word of it, that no AV touches anything.
+
+    :param values: of the game, as in its file.
+    :param where: the file, for messages.
+    """
+    found = read(tuple[Expectation, ...], values.get(EXPECT, []), f'{where}: {EXPECT}')
+    return found or (Expectation('collision', at_most=0.0),)
+
+
+def known_measure(name: str, where: str) -> str:
+    """
+    Return the full name of a measure: `ttc` is `worst_ttc`.
+
+    :param where: for messages.
+    :raises InputError: if there is no such measure.
+    """
+    found = name if name in KNOWN else f'{_WORST}{name}'
+    if found not in KNOWN:
+        near = get_close_matches(name, KNOWN, 3)
+        raise InputError(f'there is no measure {name[:60]!r}', where,
+                         (f'did you mean {" or ".join(near)}? ' if near else '')
+                         + 'docs/testing.md names them')
+    return found
 
 
 def value_of(measure: str, row: Row) -> float | None:
@@ -51,6 +80,7 @@ def value_of(measure: str, row: Row) -> float | None:
 
     :param row: of the table `vehicles` of an evaluation.
     """
+    measure = measure if measure in KNOWN else f'{_WORST}{measure}'
     if measure == GOAL_REACHED_S:
         # Never reached is later than any time.
         reached = _number(row.get('score_reached_s'))
@@ -62,6 +92,18 @@ def value_of(measure: str, row: Row) -> float | None:
         value = float(summary.values(*(np.array([_number(row.get(name))])
                                        for name in summary.columns))[0])
     return None if math.isnan(value) else value
+
+
+def worst_of(measure: str, rows: Sequence[Row], sign: int) -> float | None:
+    """
+    Return the value of a measure of the worst AV; None where it is undefined for all.
+
+    :param rows: of the driven vehicles of a run.
+    :param sign: 1 if the smallest value is the worst, -1 if the greatest is.
+    """
+    values = [value for row in rows if row['role'] == Role.AUTONOMOUS.value
+              and (value := value_of(measure, row)) is not None and math.isfinite(value)]
+    return min(values, key=lambda value: sign * value, default=None)
 
 
 def _number(value: object) -> float:

@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a game's variants: which of them a planner passes, and which it fails."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from crgame_ros.analysis.report.document import Article, Page
+from crgame_ros.analysis.report.section import Section
+from crgame_ros.analysis.report.text import free, plain
+from crgame_ros.paths import page_directory
+from crgame_ros.variation.space import Axis, Variant
+from crgame_ros.version import __version__
+from crgame_ros.whole_file import write_text
+
+Verdict = Literal['pass', 'failure', 'excused', 'unknown']
+_KEY = (('pass', 'kept'), ('failure', 'failure'), ('excused', 'no AV to blame'),
+        ('unknown', 'could not be run'))
+
+
+@dataclass(frozen=True)
+class VariantPoint:
+    """
+    A variant that was run.
+
+    :param cell: key of its cell.
+    :param variant: its values.
+    :param values: of the goals; None where one is undefined.
+    :param verdict: on it.
+    :param told: why, for people.
+    """
+
+    cell: str
+    variant: Variant
+    values: Sequence[float | None]
+    verdict: Verdict
+    told: str = ''
+
+
+@dataclass(frozen=True)
+class VariantsView:
+    """
+    The content of the page.
+
+    :param title: heading.
+    :param lines: what was found, a line each.
+    :param goals: names of the measures of its points.
+    :param axes: of what varies, as `axis_values` returns them.
+    :param nominal: values of the game as it is.
+    :param points: all variants.
+    :param slices: probability of a failure over pairs of dimensions: names x and y, and rows of
+        probabilities from low to high y.
+    :param links: by cell, addresses relative to the page by what they are.
+    :param commands: for the terminal, with what each does.
+    """
+
+    title: str
+    lines: Sequence[str]
+    goals: Sequence[str]
+    axes: Sequence[Mapping[str, object]]
+    nominal: Variant
+    points: Sequence[VariantPoint]
+    slices: Sequence[Mapping[str, object]] = ()
+    links: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    commands: Sequence[tuple[str, str]] = ()
+
+
+def write_variants_page(view: VariantsView, folder: Path, name: str) -> Path:
+    """
+    Write the page, completely or not at all.
+
+    :param folder: of the evaluation.
+    :param name: name of the file in it.
+    :return: its path.
+    :raises InputError: if it cannot be written.
+    """
+    there = {point.verdict for point in view.points}
+    key = ''.join(f'<span class="{kind}">{words}</span>' for kind, words in _KEY if kind in there)
+    boundary = '<p class="note">The ground is the estimated probability of a failure, averaged ' \
+        'over the other dimensions.</p>' if view.slices else ''
+    sections = [
+        Section('found', 'What was found', '<ul>' + ''.join(
+            f'<li>{plain(line)}</li>' for line in view.lines) + '</ul>' + ''.join(
+                f'<p>{plain(words)}: <code>{plain(command)}</code></p>'
+                for words, command in view.commands)),
+        Section('variants', 'All variants', f'<p class="key">{key}</p>'
+                '<p class="note">A line is a variant; click on one, or on a point below, to see '
+                'it.</p><div id="lines"></div><div id="chosen" class="chosen-variant">'
+                '<p>No variant is chosen.</p></div>'),
+        Section('coverage', 'Coverage', '<p class="note">Each point is a variant; the cross is '
+                f'the game as it is.</p>{boundary}<div id="maps" class="maps"></div>')]
+    page = page_directory() / 'variants'
+    data = {'axes': list(view.axes), 'goals': list(view.goals),
+            'nominal': dict(view.nominal), 'points': [asdict(point) for point in view.points],
+            'slices': list(view.slices), 'links': dict(view.links),
+            'command': f'crgame evaluate {folder} --cell'}
+    path = folder / name
+    write_text(Page(
+        view.title, free(f'{len(view.points)} variants'), (), (Article(sections),),
+        f'crgame_ros {__version__}', (page / 'variants.css').read_text(encoding='utf-8'),
+        'variants/variants.ts', data).html(), path)
+    return path
+
+
+def axis_values(axis: Axis) -> dict[str, object]:
+    """Return the name of a dimension with its ends, or with its values if these are names."""
+    if not axis.is_numeric:
+        return {'name': axis.name, 'values': list(axis.spec.values)}
+    ends = axis.spec.values or (axis.value(0.0), axis.value(1.0))
+    numbers = [float(end) for end in ends if isinstance(end, int | float)]
+    return {'name': axis.name, 'low': min(numbers), 'high': max(numbers)}

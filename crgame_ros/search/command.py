@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The command `crgame search`: the variants of a game in which a planner does worst."""
+
+import argparse
+from importlib.util import find_spec
+from pathlib import Path
+from typing import get_args, TYPE_CHECKING
+
+from crgame_ros.errors import InputError
+from crgame_ros.paths import extra_install, find_game
+from crgame_ros.search.settings import Goal, Sampler, SearchSettings
+
+if TYPE_CHECKING:
+    from crgame_ros.evaluation.evaluation import Computing
+
+DESCRIPTION = """\
+Find the variants of a game in which its AVs do worst. The game file tells with `vary:` what may
+change, and with `expect:` what is a failure (without it, a contact).
+
+  crgame search cut_in_family --minimise min_distance --budget 200
+  crgame search game.yaml --minimise ttc --planner my.py:Mine --budget 2000
+  crgame search game.yaml --minimise ttc --maximise progress          several: NSGA-II
+  crgame search searches/game                                         go on with a search
+
+Of the runs, half explore, a fifth refine the boundary between pass and fail, a twentieth look for
+the smallest change of the game that fails, and a quarter estimate how probable a failure is. The
+same command goes on where it was stopped. The worst runs are in `found/`, each with a game in
+which you can drive yourself: ./run.sh searches/game/found/1/live.yaml
+
+docs/search.md tells more."""
+_DEFAULT_GOAL = 'ttc'
+INSTALL = extra_install('search')
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the command."""
+    parser.description = DESCRIPTION
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    add = parser.add_argument
+    add('game', metavar='GAME|FOLDER', help='a game file with `vary:`, the name of a game of this '
+        'package, or the folder of a search')
+    add('--minimise', action='append', default=[], metavar='MEASURE',
+        help=f'a measure that is bad when small (default: {_DEFAULT_GOAL}); may be repeated')
+    add('--maximise', action='append', default=[], metavar='MEASURE',
+        help='a measure that is bad when large; may be repeated')
+    add('--planner', metavar='NAME', help="planner of all AVs (default: the game's own)")
+    add('--option', action='append', default=[], metavar='KEY=VALUE',
+        help='an option of this planner; may be repeated')
+    add('--budget', type=int, default=500, metavar='N', help='runs (default: %(default)d)')
+    add('--seed', type=int, default=0, metavar='N', help='of the search (default: 0)')
+    add('--sampler', choices=get_args(Sampler), default='tpe',
+        help='of Optuna, that explores (default: tpe; nsga2 for several measures)')
+    add('--batch', type=int, default=8, metavar='N', help='variants that are chosen together, as '
+        'many as there are workers or more (default: %(default)d)')
+    add('--explore-only', action='store_true', help='only explore, with all runs')
+    add('--unavoidable', action='store_true',
+        help='count contacts that no AV could avoid as failures, too')
+    add('--keep', type=int, default=5, metavar='N',
+        help='worst runs to write into found/ (default: %(default)d)')
+    add('--out', type=Path, metavar='DIR', help='folder (default: searches/<name of the game>)')
+    add('--workers', type=int, metavar='N', help='processes (default: one for each processor)')
+    add('--scheduler', metavar='ADDRESS', help='a Dask scheduler whose workers compute instead')
+    parser.set_defaults(command=run)
+
+
+def run(values: argparse.Namespace) -> int:
+    """
+    Search, and write what was found.
+
+    :return: exit code 0, whether failures were found or not.
+    :raises InputError: if anything cannot be used.
+    """
+    _require()
+    from crgame_ros.search.findings import write_findings
+    from crgame_ros.search.page import write_search_page
+    from crgame_ros.search.progress import SearchProgress
+    from crgame_ros.search.search import begin, refuse_evaluation, run_search
+    from crgame_ros.search.text import lines, results_text
+    from crgame_ros.whole_file import write_text
+    given = Path(values.game)
+    if given.is_dir():
+        folder = given
+    else:
+        settings = _settings(values, given if given.exists() else find_game(given))
+        folder = values.out or Path('searches') / Path(settings.game).stem
+        refuse_evaluation(folder)
+        begin(settings, folder)
+    settings = SearchSettings.read(folder)
+    progress = SearchProgress(settings.budget)
+    try:
+        result = run_search(folder, _computing(values), progress.began, progress.ended)
+    finally:
+        progress.close()
+    write_text(results_text(result), folder / 'results.json')
+    found = write_findings(result, folder, values.keep)
+    page = write_search_page(result, found, folder)
+    for line in lines(result):
+        print(line)
+    if found:
+        print(f'drive one yourself: ./run.sh {found[-1][1] / "live.yaml"}')
+    print(page)
+    return 0
+
+
+def _require() -> None:
+    from crgame_ros.evaluation.dask_cluster import require_dask
+    require_dask()
+    # To import them takes a second, which is too long to refuse a wrong name.
+    if None in (find_spec('cmaes'), find_spec('optuna'), find_spec('sklearn')):
+        raise InputError('needs Optuna, cmaes and scikit-learn', 'crgame search', INSTALL)
+
+
+def _settings(values: argparse.Namespace, game: Path) -> SearchSettings:
+    from crgame_ros.launcher.arguments import read_options
+    from crgame_ros.schema.marks import named_file
+    for name, value, least, most in (
+            ('budget', values.budget, 1, 10_000_000), ('batch', values.batch, 1, 10_000),
+            ('seed', values.seed, 0, 2**32 - 1), ('keep', values.keep, 0, 1000)):
+        if not least <= value <= most:
+            raise InputError(f'is {value}', f'--{name}', f'give {least} to {most}')
+    if values.option and not values.planner:
+        raise InputError('is for a planner', '--option', 'name it with --planner')
+    goals = (*(Goal(name, 1) for name in values.minimise),
+             *(Goal(name, -1) for name in values.maximise)) or (Goal(_DEFAULT_GOAL, 1),)
+    if len(goals) > 1 and values.sampler in ('tpe', 'cmaes'):
+        values.sampler = 'nsga2'
+    return SearchSettings(
+        str(game.resolve()), goals,
+        named_file(values.planner, Path.cwd()) if values.planner else '',
+        dict(read_options(values.option)), values.budget, values.batch, values.seed,
+        values.sampler, values.explore_only, values.unavoidable)
+
+
+def _computing(values: argparse.Namespace) -> 'Computing':
+    from crgame_ros.evaluation.dask_cluster import default_workers
+    from crgame_ros.evaluation.evaluation import Computing
+    workers = default_workers() if values.workers is None else values.workers
+    if not 1 <= workers <= 10_000:
+        raise InputError(f'is {workers}', '--workers', 'give 1 or more')
+    return Computing(values.scheduler, workers)

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a search."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from crgame_ros.evaluation.variants_page import (
+    axis_values,
+    VariantPoint,
+    VariantsView,
+    write_variants_page,
+)
+from crgame_ros.search.findings import GAME, LIVE, REPORT
+from crgame_ros.search.search import SearchResult
+from crgame_ros.search.text import boundary_slices, lines, told, verdict
+from crgame_ros.search.trials import Outcome
+
+PAGE = 'index.html'
+
+
+def write_search_page(result: SearchResult, found: Sequence[tuple[Outcome, Path]],
+                      folder: Path) -> Path:
+    """
+    Write the page of a search into its folder.
+
+    :param found: failures with their folders.
+    :return: its file.
+    :raises InputError: if it cannot be written.
+    """
+    links = {outcome.key: {
+        'report': (place / REPORT).relative_to(folder).as_posix(),
+        'game': (place / GAME).relative_to(folder).as_posix()} for outcome, place in found}
+    view = VariantsView(
+        f'{Path(result.settings.game).stem}: where '
+        f'{result.settings.planner.rpartition("/")[2] or "its planner"} fails',
+        list(lines(result)),
+        [goal.measure for goal in result.settings.goals],
+        [axis_values(axis) for axis in result.space.axes], result.space.nominal,
+        [VariantPoint(outcome.key, outcome.variant, outcome.values, verdict(outcome),
+                      told(outcome)) for outcome in result.outcomes],
+        list(boundary_slices(result)), links,
+        [(f'Drive in {place.name} yourself', f'./run.sh {place / LIVE}') for _, place in found])
+    return write_variants_page(view, folder, PAGE)

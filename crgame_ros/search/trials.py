@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Runs variants of a game as cells of an evaluation, each once, also after an interruption."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from crgame_ros.evaluation.cell import Cell
+from crgame_ros.evaluation.cell_batches import CellBatches
+from crgame_ros.evaluation.cell_grid import CellGrid
+from crgame_ros.evaluation.cell_process import Limits
+from crgame_ros.evaluation.cell_scene import variant_text
+from crgame_ros.evaluation.evaluation import rows_of
+from crgame_ros.evaluation.folder import EvaluationFolder
+from crgame_ros.evaluation.judging import shortfalls, worst_of
+from crgame_ros.evaluation.plan import EvaluationPlan
+from crgame_ros.evaluation.results.parts import ResultParts, stored_rows
+from crgame_ros.game.expectation import Expectation
+from crgame_ros.game.objects import Role
+from crgame_ros.search.settings import SearchSettings
+
+Variant = Mapping[str, object]
+# Blames of a contact that an AV could have avoided, and of a run without a contact.
+AVOIDABLE = ('', 'avoidable')
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """
+    What became of a variant.
+
+    :param number: of the variant in the search, from 0.
+    :param variant: its values.
+    :param key: of its cell.
+    :param status: of its cell; `ok` if it could be run.
+    :param reason: why it could not be run, or what of its planner failed.
+    :param values: of the goals' measures, of the worst AV; None where one is undefined.
+    :param broken: how it breaks the expectations, a line each; empty if it keeps them.
+    :param excused: why no AV can be blamed; empty if one can, or nothing is broken.
+    """
+
+    number: int
+    variant: Variant
+    key: str
+    status: str
+    reason: str
+    values: tuple[float | None, ...]
+    broken: tuple[str, ...]
+    excused: str = ''
+
+    @property
+    def is_known(self) -> bool:
+        """Return whether it could be run."""
+        return self.status == 'ok'
+
+    @property
+    def is_failure(self) -> bool:
+        """Return whether an AV breaks an expectation, and can be blamed."""
+        return bool(self.broken) and not self.excused
+
+
+class Trials:
+    """
+    The variants of a search, run in batches on the workers of an evaluation.
+
+    :param settings: of the search.
+    :param expectations: what a run has to keep.
+    :param place: folder of the evaluation.
+    :param plan: plan of the evaluation.
+    :param grid: grid of one scene without variants.
+    :param parts: tables for the rows.
+    :param client: a `distributed.Client`.
+    :param limits: limits of cells and batches.
+    :param told: called with each outcome.
+    """
+
+    def __init__(self, settings: SearchSettings, expectations: Sequence[Expectation],
+                 place: EvaluationFolder, plan: EvaluationPlan, grid: CellGrid,
+                 parts: ResultParts, client: Any, limits: Limits,
+                 told: Callable[[Outcome, bool], object]) -> None:
+        self._settings, self._expectations = settings, expectations
+        self._place, self._plan, self._parts = place, plan, parts
+        self._grid = grid
+        self._client, self._limits, self._told = client, limits, told
+        self.outcomes: list[Outcome] = []
+        self._by_text: dict[str, Outcome] = {}
+        self._earlier: dict[str, Any] = {
+            row['cell']: {'cell': row, 'vehicles': vehicles}
+            for row, vehicles in stored_rows(place.path)}
+
+    @property
+    def left(self) -> int:
+        """Return how many runs of the budget are left."""
+        return self._settings.budget - len(self.outcomes)
+
+    @property
+    def known(self) -> list[Outcome]:
+        """Return the outcomes of the variants that could be run."""
+        return [outcome for outcome in self.outcomes if outcome.is_known]
+
+    @property
+    def failures(self) -> list[Outcome]:
+        """Return the outcomes in which an AV fails, and can be blamed."""
+        return [outcome for outcome in self.outcomes if outcome.is_failure]
+
+    def run(self, variants: Iterable[Variant]) -> list[Outcome]:
+        """
+        Run variants; of more than the budget has left, the first ones.
+
+        :return: their outcomes, in the order of the variants. One that was run before is not run
+            again, and costs nothing.
+        :raises CrgameError: if the scheduler is lost; what was finished is kept.
+        """
+        texts: list[str] = []
+        new: dict[str, Variant] = {}
+        for variant in variants:
+            text = variant_text(variant)
+            if text not in self._by_text and text not in new:
+                if len(new) >= self.left:
+                    break
+                new[text] = variant
+            texts.append(text)
+        if new:
+            self._run(new)
+        return [self._by_text[text] for text in texts]
+
+    def _run(self, new: Mapping[str, Variant]) -> None:
+        scene = self._grid.scenes[0]
+        cells = list(replace(self._grid, scenes=(
+            replace(scene, variants=tuple(new.values())),)))
+        missing = [cell for cell in cells if cell.key not in self._earlier]
+        self._grid = replace(self._grid, scenes=(
+            replace(scene, variants=(*scene.variants, *new.values())),))
+        if missing:
+            # Before their rows: a cell is found by the variants in the grid.
+            self._place.write_grid(self._plan, self._grid)
+            batches = CellBatches(self._client, self._place.store, self._limits, iter(missing),
+                                  len(missing))
+            for ended in batches.results():
+                rows = [rows_of(cell, found) for cell, found in ended]
+                self._parts.add(*rows)
+                for row in rows:
+                    self._earlier[row['cell']['cell']] = row
+        for cell, (text, variant) in zip(cells, new.items(), strict=True):
+            # What is kept of a run is small: memory does not grow with the tables.
+            outcome = self._outcome(cell, variant, self._earlier.pop(cell.key))
+            self.outcomes.append(outcome)
+            self._by_text[text] = outcome
+            self._told(outcome, cell in missing)
+
+    def _outcome(self, cell: Cell, variant: Variant, row: Mapping[str, Any]) -> Outcome:
+        status = str(row['cell']['status'])
+        vehicles = row['vehicles']
+        broken = [line for each in self._expectations for line in shortfalls(each, vehicles)] \
+            if status == 'ok' else []
+        blames = [str(vehicle.get('blame') or '') for vehicle in vehicles
+                  if vehicle['role'] == Role.AUTONOMOUS.value and vehicle['collided']]
+        excused = '' if self._settings.unavoidable or not broken or not blames \
+            or any(blame in AVOIDABLE for blame in blames) else blames[0]
+        return Outcome(
+            len(self.outcomes), dict(variant), cell.key, status,
+            str(row['cell'].get('reason') or ''),
+            tuple(worst_of(goal.measure, vehicles, goal.sign)
+                  for goal in self._settings.goals), tuple(broken), excused)

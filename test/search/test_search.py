@@ -1,0 +1,174 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""`crgame search` finds where a planner fails, as closed forms say, and goes on when killed."""
+
+from dataclasses import replace
+import json
+import math
+import os
+from pathlib import Path
+import re
+import signal
+import subprocess
+import sys
+import time
+
+from crgame_ros.game.file import load_game
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.schema.writing import write
+from crgame_ros.search.boundary import Boundary
+from crgame_ros.search.features import pool_of
+from crgame_ros.search.probability import importance_interval
+from crgame_ros.search.trials import Outcome
+from crgame_ros.simulation.contacts import contacts_of
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
+from crgame_ros.variation.space import game_of, space_of
+import numpy as np
+import pytest
+
+FAMILY = scenarios_directory() / 'cut_in_family.yaml'
+SPEED, HARDEST = 20.0, 8.0  # of the AV [m/s], and of the planner idm [m/s²]
+Variant = dict[str, object]
+
+
+def needed_gap(difference: float, deceleration: float) -> float:
+    """
+    Return the gap [m] that an AV needs that brakes as hard as idm does, from the first instant.
+
+    The other brakes from the first instant as well, to a standstill. The gap shrinks until both
+    are equally fast, or until the AV stands.
+    """
+    other = SPEED - difference
+
+    def way(speed: float, braking: float, t: float) -> float:
+        t = min(t, speed / braking)
+        return speed * t - 0.5 * braking * t * t
+
+    times = [SPEED / HARDEST]
+    if HARDEST > deceleration:
+        equal = difference / (HARDEST - deceleration)
+        if equal < other / deceleration:
+            times.append(equal)
+    return max(way(SPEED, HARDEST, t) - way(other, deceleration, t) for t in (*times, 0.0))
+
+
+def fails(variant: Variant) -> bool:
+    gap, difference, deceleration = (float(str(variant[name])) for name in (
+        'gap', 'difference', 'deceleration'))
+    return gap < needed_gap(difference, deceleration)
+
+
+@pytest.mark.parametrize(('difference', 'deceleration'), [
+    (10.0, 2.0), (0.0, 9.0), (10.0, 6.0), (12.0, 4.0)])
+def test_the_planner_idm_fails_where_the_closed_form_says(difference: float,
+                                                          deceleration: float) -> None:
+    game = load_game(FAMILY)
+    gap = needed_gap(difference, deceleration)
+    # Positions of objects are those of ticks of 0.1 s, and plans start at a tick.
+    for offset, contact in ((-0.2, True), (0.2, False)):
+        variant = {'gap': gap + offset, 'difference': difference, 'deceleration': deceleration}
+        result = run_offline(build_setup(game_of(game, variant, '')))
+        assert bool(contacts_of(result)) is contact
+
+
+def test_the_model_of_the_boundary_agrees_with_the_closed_form() -> None:
+    game = load_game(FAMILY)
+    space = space_of(write(game, game.base), '')
+    known = [Outcome(number, variant, str(number), 'ok', '', (None,),
+                     ('contact',) if fails(variant) else ())
+             for number, variant in enumerate(pool_of(space, 256, 1))]
+    others = pool_of(space, 2048, 2)
+    found = Boundary(space, known).probabilities(others) > 0.5
+    assert np.mean(found == [fails(variant) for variant in others]) > 0.97
+
+
+def test_the_interval_of_a_probability_holds_what_it_says() -> None:
+    rng = np.random.default_rng(5)
+    # Failures are the first 2 % of a unit interval; the proposal draws there 20 times as often.
+    true, share, inside = 0.02, 0.4, 0
+    for _ in range(400):
+        fail = rng.random(300) < share
+        terms = np.where(fail, true / share, 0.0)
+        found = importance_interval(terms, int(fail.sum()), (1 - true) / (1 - share))
+        inside += found.low <= true <= found.high
+    assert 0.92 <= inside / 400 <= 0.98
+    nothing = importance_interval(np.zeros(100), 0, 1.0)
+    # The rule of three: after n runs without a failure its probability may still be 3/n.
+    assert (nothing.value, nothing.high) == (0.0, pytest.approx(0.03, abs=0.001))
+
+
+def search(folder: Path, *words: str) -> 'subprocess.Popen[str]':
+    return subprocess.Popen(
+        [sys.executable, '-m', 'crgame_ros.cli', 'search', 'cut_in_family', '--minimise',
+         'min_distance', '--budget', '40', '--keep', '1', '--out', str(folder), *words],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+
+
+@pytest.mark.slow
+def test_a_killed_search_goes_on_and_finds_the_same(tmp_path: Path) -> None:
+    whole = search(tmp_path / 'whole')
+    out, told = whole.communicate()
+    assert whole.returncode == 0, told
+    part = search(tmp_path / 'part')
+    journal = tmp_path / 'part'
+    while sum(file.read_text().count('\n') for file in journal.glob('journal-*.jsonl')) < 12:
+        assert part.poll() is None
+        time.sleep(0.05)
+    # The command, its scheduler and its workers, as a machine that fails would end them.
+    os.killpg(part.pid, signal.SIGKILL)
+    part.communicate()
+    again = search(tmp_path / 'part', '--workers', '1')
+    out_again, told = again.communicate()
+    assert again.returncode == 0, told
+    assert out_again.replace('/part/', '/whole/') == out
+    results = (tmp_path / 'whole' / 'results.json').read_bytes()
+    assert results == (tmp_path / 'part' / 'results.json').read_bytes()
+    found = json.loads(results)
+    assert len(found['outcomes']) == 40
+    for outcome in found['outcomes']:
+        gap = float(outcome['variant']['gap']) - needed_gap(
+            outcome['variant']['difference'], outcome['variant']['deceleration'])
+        if abs(gap) > 0.2:
+            assert (outcome['verdict'] == 'failure') is (gap < 0.0)
+    # By the closed form, over an even sample.
+    game = load_game(FAMILY)
+    true = float(np.mean([fails(each) for each in pool_of(
+        space_of(write(game, game.base), ''), 4096, 0)]))
+    assert found['probability']['low'] <= true <= found['probability']['high']
+    game_file = tmp_path / 'whole' / 'found' / '1' / 'game.yaml'
+    assert contacts_of(run_offline(build_setup(load_game(game_file))))
+    live = load_game(game_file.with_name('live.yaml'))
+    assert [(human.id, human.driver) for human in live.humans] == [('hv0', 'auto')]
+    assert live.objects == ()
+    # hv0 stands where the object stood: centre to centre.
+    assert live.humans[0].spawn is not None
+    assert math.isclose(live.humans[0].spawn.speed,
+                        load_game(game_file).objects[0].speeds[0])
+    assert 'drive one yourself: ./run.sh ' in out
+    assert re.search(r'smallest change that fails: .*→', out)
+
+
+def test_what_cannot_be_searched_is_refused_in_one_line(tmp_path: Path) -> None:
+    for words, told in (
+            (('cut_in', '--budget', '5'), 'nothing varies'),
+            (('cut_in_family', '--minimise', 'tttc'), 'did you mean worst_ttc'),
+            ((str(tmp_path),), 'holds no search'),
+            (('cut_in_family', '--budget', '0'), '--budget: is 0')):
+        done = subprocess.run([sys.executable, '-m', 'crgame_ros.cli', 'search', *words],
+                              cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stdout) == (2, '')
+        assert told in done.stderr and done.stderr.count('\n') == 1
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_dimension_can_be_a_planner(tmp_path: Path) -> None:
+    text = FAMILY.read_text().replace(
+        '\nvary:\n', '\nvary:\n  - {name: planner, values: [idm, constant-velocity], '
+        'key: avs.av0.planner}\n').replace('scenario: ', f'scenario: {scenarios_directory()}/')
+    (tmp_path / 'game.yaml').write_text(text)
+    game = load_game(tmp_path / 'game.yaml')
+    made = game_of(game, {'planner': 'constant-velocity', 'gap': 30.0, 'difference': 10.0,
+                          'deceleration': 3.0}, '')
+    assert made.avs is not None and made.avs[0].planner == 'constant-velocity'
+    assert contacts_of(run_offline(build_setup(replace(made, duration=6.0))))
