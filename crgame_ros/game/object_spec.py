@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal
 
 from crgame_ros.errors import InputError, short
+from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import (
@@ -258,6 +259,9 @@ class ObjectSpec:
     :param at: pose of its centre [m, m, rad]
     :param path: way-points of its centre [m]
     :param trajectory: predetermined states t [s], x [m], y [m], yaw [rad], see below.
+    :param shift: time by which the trajectory is late, negative for early [s]; before its first
+        row the object comes straight, at the first speed.
+    :param speed_factor: of its speed along the trajectory.
     :param lanelet: its first lanelet; it continues along the straightest successors, 5 km at most.
     :param s: station of its centre on that lanelet [m]
     :param speeds: desired speed at each way-point, linear in between [m/s]
@@ -290,6 +294,9 @@ class ObjectSpec:
                   OnlyWith(('at',))] | None = None
     path: Annotated[tuple[Point, ...], Listed(2, 1000, 'way-point'), OnlyWith(('path',))] = ()
     trajectory: Annotated[tuple[TrajectoryRow, ...], Rows(), OnlyWith(('trajectory',))] = ()
+    shift: Annotated[float, Within(-1e4, 1e4), OnlyWith(('trajectory',)), LeftOut()] = 0.0
+    speed_factor: Annotated[float, Within(0.1, 10.0), OnlyWith(('trajectory',)),
+                            LeftOut()] = 1.0
     lanelet: Annotated[int | None, OnlyWith(('lanelet',)),
                        Advice('give the id of a lanelet')] = None
     s: Annotated[float, Within(0.0, MAX_COORDINATE), OnlyWith(('lanelet',))] = 0.0
@@ -333,6 +340,29 @@ class ObjectSpec:
             return MOVER_TYPES[self.type].shape
         return MOVER_TYPES['car'].shape if self.type == 'parkedVehicle' \
             else Shape.rectangle(1.0, 1.0)
+
+    @property
+    def timed_trajectory(self) -> tuple[TrajectoryRow, ...]:
+        """Return its trajectory, shifted in time and driven at another speed."""
+        rows = self.trajectory
+        if not rows or (self.shift, self.speed_factor) == (0.0, 1.0):
+            return rows
+        begin = rows[0][0]
+        timed = [(begin + self.shift + (row[0] - begin) / self.speed_factor, *row[1:])
+                 for row in rows]
+        if self.shift > 0.0:
+            (t, x, y, yaw), (t1, x1, y1, _) = timed[:2]
+            share = self.shift / (t1 - t)
+            return ((begin, x - share * (x1 - x), y - share * (y1 - y), yaw), *timed)
+        cut = next((place for place, row in enumerate(timed) if row[0] > begin), len(timed) - 1)
+        if cut == 0:
+            return tuple(timed)
+        (t, *before), (t1, *after) = timed[cut - 1], timed[cut]
+        share = min(max((begin - t) / (t1 - t), 0.0), 1.0)
+        turn = wrap_pi(after[2] - before[2])
+        first = (begin, before[0] + share * (after[0] - before[0]),
+                 before[1] + share * (after[1] - before[1]), before[2] + share * turn)
+        return (first, *timed[cut:])
 
     @property
     def mover(self) -> MoverType:

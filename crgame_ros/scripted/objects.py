@@ -263,7 +263,7 @@ def _motion(spec: ObjectSpec, network: RoadNetwork | None, time_step_s: float,
     if spec.at is not None:
         return Standstill(spec.at)
     if spec.trajectory:
-        return Predetermined(spec.trajectory, spec.start, spec.end == 'stay', time_step_s)
+        return Predetermined(spec.timed_trajectory, spec.start, spec.end == 'stay', time_step_s)
     if spec.kind == 'particle':
         return ParticleMotion(spec)
     if spec.lanelet is not None:

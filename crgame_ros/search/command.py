@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import get_args, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
-from crgame_ros.paths import extra_install, find_game
+from crgame_ros.evaluation.file_names import SEARCH_FILE
+from crgame_ros.paths import extra_install, find_game, make_folder
 from crgame_ros.search.settings import Goal, Sampler, SearchSettings
 
 if TYPE_CHECKING:
@@ -21,7 +22,8 @@ change, and with `expect:` what is a failure (without it, a contact).
   crgame search cut_in_family --minimise min_distance --budget 200
   crgame search game.yaml --minimise ttc --planner my.py:Mine --budget 2000
   crgame search game.yaml --minimise ttc --maximise progress          several: NSGA-II
-  crgame search searches/game                                         go on with a search
+  crgame search runs/NAME --planner my.py:Mine      recorded humans, earlier, later, faster
+  crgame search searches/game                       go on with a search
 
 Of the runs, half explore, a fifth refine the boundary between pass and fail, a twentieth look for
 the smallest change of the game that fails, and a quarter estimate how probable a failure is. The
@@ -30,6 +32,7 @@ which you can drive yourself: ./run.sh searches/game/found/1/live.yaml
 
 docs/search.md tells more."""
 _DEFAULT_GOAL = 'ttc'
+SEARCHES = Path('searches')
 INSTALL = extra_install('search')
 
 
@@ -38,8 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = DESCRIPTION
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
-    add('game', metavar='GAME|FOLDER', help='a game file with `vary:`, the name of a game of this '
-        'package, or the folder of a search')
+    add('game', metavar='GAME|RUN|FOLDER', help='a game file with `vary:`, the name of a game of '
+        'this package, a recorded run, or the folder of a search')
     add('--minimise', action='append', default=[], metavar='MEASURE',
         help=f'a measure that is bad when small (default: {_DEFAULT_GOAL}); may be repeated')
     add('--maximise', action='append', default=[], metavar='MEASURE',
@@ -79,11 +82,11 @@ def run(values: argparse.Namespace) -> int:
     from crgame_ros.search.text import lines, results_text
     from crgame_ros.whole_file import write_text
     given = Path(values.game)
-    if given.is_dir():
+    if (given / SEARCH_FILE).exists():
         folder = given
     else:
-        settings = _settings(values, given if given.exists() else find_game(given))
-        folder = values.out or Path('searches') / Path(settings.game).stem
+        settings = _settings(values, _game(given, values))
+        folder = values.out or SEARCHES / Path(settings.game).stem
         refuse_evaluation(folder)
         begin(settings, folder)
     settings = SearchSettings.read(folder)
@@ -101,6 +104,18 @@ def run(values: argparse.Namespace) -> int:
         print(f'drive one yourself: ./run.sh {found[-1][1] / "live.yaml"}')
     print(page)
     return 0
+
+
+def _game(given: Path, values: argparse.Namespace) -> Path:
+    """Return the file of the game that the command line gives."""
+    from crgame_ros.search.recorded_human import game_of_run, is_recording
+    if not given.is_dir():
+        return given if given.exists() else find_game(given)
+    if not is_recording(given):
+        raise InputError('is neither a search nor a recorded run', str(given), 'name a game file')
+    folder = SEARCHES if values.out is None else values.out.parent
+    make_folder(folder, 'choose another place with --out')
+    return game_of_run(given, folder, values.planner is not None)
 
 
 def _require() -> None:

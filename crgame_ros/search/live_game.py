@@ -34,7 +34,7 @@ def _spawn(item: ObjectSpec) -> LaneletSpawn | PoseSpawn:
         return LaneletSpawn(item.lanelet, max(0.0, item.s - rear_to_center), 0.0,
                             item.mover.speed)
     if item.trajectory:
-        (t0, x, y, yaw), (t1, x1, y1, _) = item.trajectory[:2]
+        (t0, x, y, yaw), (t1, x1, y1, _) = item.timed_trajectory[:2]
         speed = math.dist((x, y), (x1, y1)) / max(t1 - t0, 1e-6)
     else:
         (x, y), (x1, y1) = item.path[:2]

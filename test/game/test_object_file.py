@@ -13,6 +13,7 @@ from crgame_ros.game.object_spec import MAX_OBJECTS, MOVER_TYPES, ObjectList, Ob
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.schema.reading import read
 from crgame_ros.schema.writing import write
+import numpy as np
 import pytest
 import yaml
 
@@ -195,3 +196,22 @@ def test_wrong_trajectory_files_are_refused(name: str, prepare: Callable[[Path],
     prepare(folder)
     with pytest.raises(InputError, match=message):
         parse([{'kind': 'bicycle', 'trajectory': name}], folder)
+
+
+@pytest.mark.parametrize(('shift', 'factor'), [
+    (0.0, 1.0), (0.7, 1.0), (-0.7, 1.0), (0.0, 1.5), (1.3, 0.8), (-2.2, 1.2)])
+def test_a_trajectory_is_driven_later_and_faster(shift: float, factor: float) -> None:
+    # x(t) = 8 t + t² along the x axis: where it is at t is where it was at factor (t - shift).
+    rows = [[0.1 * n, 8.0 * 0.1 * n + (0.1 * n) ** 2, 0.0] for n in range(100)]
+    spec, = parse([{'kind': 'bicycle', 'trajectory': rows, 'shift': shift,
+                    'speed_factor': factor}])
+    timed = spec.timed_trajectory
+    times, places = [row[0] for row in timed], [row[1] for row in timed]
+    assert times[0] == 0.0 and all(a < b for a, b in zip(times, times[1:], strict=False))
+    for step in range(40):
+        t = 0.1 * step
+        then = factor * (t - shift)
+        # Before its first row it comes at the first speed, 8.1 m/s as given.
+        expected = 8.0 * then + then ** 2 if then >= 0.0 else 8.1 * then
+        found = np.interp(t, times, places)
+        assert found == pytest.approx(expected, abs=0.01)

@@ -153,7 +153,7 @@ def test_what_cannot_be_searched_is_refused_in_one_line(tmp_path: Path) -> None:
     for words, told in (
             (('cut_in', '--budget', '5'), 'nothing varies'),
             (('cut_in_family', '--minimise', 'tttc'), 'did you mean worst_ttc'),
-            ((str(tmp_path),), 'holds no search'),
+            ((str(tmp_path),), 'is neither a search nor a recorded run'),
             (('cut_in_family', '--budget', '0'), '--budget: is 0')):
         done = subprocess.run([sys.executable, '-m', 'crgame_ros.cli', 'search', *words],
                               cwd=tmp_path, capture_output=True, text=True, check=False)
