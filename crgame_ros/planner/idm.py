@@ -17,8 +17,14 @@ from crgame_ros.planner.reference_path import DrivingPath
 from crgame_ros.planner.route_lane_change import has_gap, LaneChange, Verdict
 from crgame_ros.planner.side_lanes import OWN_LANE, SideLane
 from crgame_ros.planner.speed_profile import admissible_speeds, default_speed, desired_speeds
-from crgame_ros.roads.signals import TrafficLights
-from crgame_ros.roads.signs import has_stop_sign, lights_for, lights_of, stop_line_middle
+from crgame_ros.roads.signals import RED_STATES, TrafficLights
+from crgame_ros.roads.signs import (
+    has_stop_sign,
+    lights_for,
+    lights_of,
+    SIGN_REACH,
+    stop_line_middle,
+)
 from crgame_ros.vehicle.idm_model import free_acceleration, IdmParameters, interaction
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import STANDING, StateColumn, VehicleState
@@ -26,7 +32,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 TURN = 0.45
-SIGN_REACH = 4.0
 Array = NDArray[np.float64]
 LINE_GAP = 0.5
 # A standing vehicle starts when the model wants at least this share of a; it stops below it.
@@ -100,7 +105,7 @@ class StopLines:
                 continue
             needed = speed ** 2 / (2.0 * max(distance, 0.1))
             shown = {states.get(light, 'inactive') for light in line.lights}
-            if shown & {'red', 'redYellow'} and needed <= self._max_deceleration:
+            if shown & RED_STATES and needed <= self._max_deceleration:
                 return line.s
             if 'yellow' in shown and needed <= self._deceleration:
                 return line.s

@@ -4,13 +4,19 @@
 
 from bisect import bisect_right
 from itertools import accumulate
+import math
 
 from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.traffic_light import TrafficLight
+from crgame_ros.roads.signs import has_arrow, lights_for
 import numpy as np
 from numpy.typing import NDArray
 
 INACTIVE = 'inactive'
+# The states in which nobody may pass.
+RED_STATES = frozenset({'red', 'redYellow'})
+# Cycles of several lights are compared over at most this number of time steps.
+LONGEST_CYCLE = 20_000
 
 
 class LightCycle:
@@ -82,3 +88,30 @@ def traffic_light_states(scenario: Scenario, k: int) -> dict[int, str]:
     :return: by traffic-light id: red, yellow, redYellow, green or inactive
     """
     return TrafficLights(scenario).states_at(k)
+
+
+def governing_lights(lights: list[TrafficLight], arrow: str) -> list[TrafficLight]:
+    """
+    Return the lights that govern a movement; one that shows red stops it.
+
+    A light without arrows is for all movements, one with arrows for those it points to. If no
+    light is for a movement, all lights are. If those are never all free at once, only those with
+    arrows count.
+
+    :param arrow: straight, left or right.
+    """
+    chosen = lights_for(lights, arrow)
+    arrows = [light for light in chosen if has_arrow(light)]
+    return arrows if 0 < len(arrows) < len(chosen) and _is_never_free(chosen) else chosen
+
+
+def _is_never_free(lights: list[TrafficLight]) -> bool:
+    """Return whether at least one of the lights is red at any time."""
+    red = [_red_steps(light) for light in lights]
+    step = np.arange(min(math.lcm(*(len(x) for x in red)), LONGEST_CYCLE))
+    return bool(np.any([x[step % len(x)] for x in red], axis=0).all())
+
+
+def _red_steps(light: TrafficLight) -> NDArray[np.bool_]:
+    """Return whether a light is red at each time step of its cycle."""
+    return np.isin(LightCycle(light).states_over(), list(RED_STATES))

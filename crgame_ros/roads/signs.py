@@ -17,6 +17,8 @@ LIMITS = frozenset({MAX_SPEED, 'MAX_SPEED_ZONE_START'})
 YIELDING = frozenset({STOP, 'YIELD', 'ROUNDABOUT'})
 PRIORITY = frozenset({'PRIORITY', 'RIGHT_OF_WAY'})
 HEEDED = LIMITS | YIELDING | PRIORITY
+# Who stands at most this far before a stop sign's line has halted for it [m].
+SIGN_REACH = 4.0
 
 
 def sign_elements(lanelet: Lanelet, roads: LaneletNetwork,

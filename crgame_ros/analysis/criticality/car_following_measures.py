@@ -32,6 +32,7 @@ class Ahead(NamedTuple):
     :param headway: from the subject's front to the leader's front, along the path [m]
     :param front: the subject's corner that is furthest along the path.
     :param rear: the leader's corner that is least far along it.
+    :param aside: from the subject's centre to the leader's, to the left of the path [m]
     """
 
     number: int
@@ -39,6 +40,7 @@ class Ahead(NamedTuple):
     headway: float
     front: 'Corner'
     rear: 'Corner'
+    aside: float
 
 
 class Corner(NamedTuple):
@@ -91,7 +93,8 @@ def find_leader(seen: SeenPath, others: FloatArray, radii: FloatArray,
     return Ahead(int(candidates[nearest]), float(rear[nearest] - front),
                  float(along[nearest, 1:].max() - front),
                  Corner(own_corner - 1, front, d[own_corner]),
-                 Corner(corner - 1, float(along[nearest, corner]), float(aside[nearest, corner])))
+                 Corner(corner - 1, float(along[nearest, corner]), float(aside[nearest, corner])),
+                 float(aside[nearest, 0]) - d[0])
 
 
 def time_gap(gap: float, speed: float) -> float:

@@ -13,6 +13,7 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.analysis.criticality.car_following_measures import (
+    Ahead,
     Corner,
     deceleration_to_avoid_crash,
     find_leader,
@@ -240,6 +241,8 @@ class Criticality:
 
     :param run: description of the run; a vehicle without a planning problem follows its lane.
     :param thresholds: thresholds of critical values.
+    :ivar loaded: the scenario of the run.
+    :ivar roads: its roads.
     :ivar vehicles: number of driven vehicles.
     :ivar ids: ids of driven vehicles, then of objects.
     :ivar n: simulation step that was measured last; -1 before the first.
@@ -248,6 +251,7 @@ class Criticality:
     """
 
     def __init__(self, run: ObservedRun, thresholds: Thresholds = USUAL) -> None:
+        self.loaded = run.loaded
         self.vehicles = len(run.vehicles)
         everybody = (*run.vehicles, *run.others)
         self.ids = tuple(item.id for item in everybody)
@@ -256,9 +260,9 @@ class Criticality:
         self._transforms = run.road_transforms
         self._rear_to_center = np.array([item.rear_to_center for item in run.vehicles])
         self._footprints = NearbyFootprints(everybody)
-        roads = RoadNetwork(run.loaded.scenario.lanelet_network)
-        self._paths = OwnPaths(roads, [
-            frozenset() if problem is None else goal_lanelets(roads, problem)
+        self.roads = RoadNetwork(run.loaded.scenario.lanelet_network)
+        self._paths = OwnPaths(self.roads, [
+            frozenset() if problem is None else goal_lanelets(self.roads, problem)
             for problem in run.problems or (None,) * self.vehicles])
         self._crossings = EncroachmentDetector(self.vehicles, self._footprints.radii)
         self._before: tuple[float, FloatArray] | None = None
@@ -367,7 +371,9 @@ class Criticality:
                 (leader.front, subject), (leader.rear, int(others[leader.number]))))
         values[leader.number, :_OF_LEADER] = _compute_leader_measures(
             leader.gap, speed, leader_speed, acceleration, leader_acceleration)
-        return Following(leader.gap, leader.headway, speed)
+        number = int(others[leader.number])
+        return Following(leader.gap, leader.headway, speed, number, leader_speed,
+                         _comes_aside(seen.path.line, leader, scene, number))
 
     def _sum_up(self, time_s: float) -> None:
         step_s = self._scheduler.time_step_s
@@ -390,6 +396,14 @@ def _rates_along(path: Curve, corner: Corner, scene: Scene, number: int) -> list
     vx, vy, yaw_rate = scene.rates[number].tolist()
     return path.rates(corner.s, corner.d, (vx - yaw_rate * y, vy + yaw_rate * x),
                       scene.accelerations[number].tolist())
+
+
+def _comes_aside(path: Curve, leader: Ahead, scene: Scene, number: int) -> float:
+    """Return how fast a leader moves across the path to the side on which the subject is [m/s]."""
+    heading = path.place(leader.rear.s)[3]
+    vx, vy, _ = scene.rates[number].tolist()
+    return math.copysign(1.0, -leader.aside) * (
+        vy * math.cos(heading) - vx * math.sin(heading))
 
 
 def _compute_leader_measures(gap: float, speed: float, leader_speed: float, acceleration: float,

@@ -22,11 +22,17 @@ class Following(NamedTuple):
     :param gap: from the vehicle's front to the leader's rear, along the vehicle's path [m]
     :param headway: from the vehicle's front to the leader's front, along the path [m]
     :param speed: of the vehicle along its path [m/s]
+    :param leader: number of the leader among vehicles and objects.
+    :param leader_speed: of the leader along the vehicle's path [m/s]
+    :param comes_aside: speed of the leader across the path, towards the vehicle's side [m/s]
     """
 
     gap: float
     headway: float
     speed: float
+    leader: int
+    leader_speed: float
+    comes_aside: float
 
 
 class Distribution(NamedTuple):
@@ -51,18 +57,21 @@ class Headways:
     :ivar ticks: at which the vehicle was there.
     :ivar approaching: ticks at which it was closing in on its leader, with a finite ttc.
     :ivar following: one for each tick with a leader.
+    :ivar following_ticks: these ticks, counted from 0.
     """
 
     ticks: int = 0
     approaching: int = 0
     following: list[Following] = field(default_factory=list)
+    following_ticks: list[int] = field(default_factory=list)
 
     def add(self, following: Following | None, ttc_s: float) -> None:
         """Add a tick; `following` is None without a leader."""
-        self.ticks += 1
-        self.approaching += math.isfinite(ttc_s)
         if following is not None:
             self.following.append(following)
+            self.following_ticks.append(self.ticks)
+        self.ticks += 1
+        self.approaching += math.isfinite(ttc_s)
 
     def share_following(self) -> float:
         """Return the share of the ticks with a leader."""
@@ -85,7 +94,8 @@ class Headways:
                 'time_headway': _distribution(moving[:, 1] / moving[:, 2])}
 
     def _values(self) -> NDArray[np.float64]:
-        return np.array(self.following, dtype=np.float64).reshape(-1, 3)
+        return np.array([each[:3] for each in self.following],
+                        dtype=np.float64).reshape(-1, 3)
 
     def _share(self, count: int) -> float:
         return count / self.ticks if self.ticks else math.nan

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The section on a run's events, contacts and violations."""
+"""The section on a run's events, contacts, violations and traffic rules."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -8,13 +8,15 @@ from typing import Any
 from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import Section
 from crgame_ros.analysis.report.story_section import moment
-from crgame_ros.analysis.report.text import free, note, NOTHING, number, table
+from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
+from crgame_ros.analysis.rules.measures import MEASURES
 from crgame_ros.analysis.runs.run import Run
+from crgame_ros.units import unit_symbol
 
 
 def outcome_section(run: Run) -> Section:
-    """Return the section on contacts, violations and events that took effect."""
-    html = _contacts(run) + _violations(run) + _events(run)
+    """Return the section on contacts, violations, rules and events that took effect."""
+    html = _contacts(run) + _violations(run) + _rules(run) + _events(run)
     return Section('outcome', 'Contacts, violations, events', html)
 
 
@@ -48,6 +50,24 @@ def _violations(run: Run) -> str:
         (named(run, item['vehicle']), free(item['what']),
          NOTHING if item['n'] is None else moment(run, _time_s(run, item)))
         for item in found], 'numbers')
+
+
+def _rules(run: Run) -> str:
+    html = table('Traffic rules', ('vehicle', *(
+        f'<span title="{plain(f"{each.definition}; {each.variant}")}">{each.label}</span>'
+        + ('' if each.unit == '1' else f' [{unit_symbol(each.unit)}]')
+        for each in MEASURES.values())), [
+            (named(run, vehicle.vehicle_id), *(
+                number(vehicle.values[name], 0 if each.is_count else 2)
+                for name, each in MEASURES.items()))
+            for vehicle in run.usual_rules], 'numbers')
+    scheduler = run.log.game.scheduler
+    passed = [(named(run, vehicle.vehicle_id), each.kind, str(each.lanelet),
+               moment(run, (each.k - scheduler.k0) * scheduler.time_step_s), number(each.speed))
+              for vehicle in run.usual_rules for each in vehicle.passed]
+    return html if not passed else html + table(
+        'Lines passed at red, or at a stop sign without a halt', (
+            'vehicle', 'what', 'lanelet', 'at [s]', 'speed [m/s]'), passed, 'numbers')
 
 
 def _events(run: Run) -> str:

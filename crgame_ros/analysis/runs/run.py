@@ -31,6 +31,7 @@ if TYPE_CHECKING:  # They take a second to import, and only measures need them.
     from crgame_ros.analysis.pictures.critical_moments import Moment, Touch
     from crgame_ros.analysis.pictures.scene_frame import FrameScene
     from crgame_ros.analysis.pictures.timing_figure import TimedRun
+    from crgame_ros.analysis.rules.vehicle_rules import VehicleRules
     from crgame_ros.analysis.scores.run_scores import RunScores
     from crgame_ros.recording.recorded_plans import RecordedPlan
 
@@ -309,6 +310,12 @@ class Run:
         """Measure how each vehicle was driven, in the log's order; no event is a request."""
         from crgame_ros.analysis.behaviour.driver import measure_behaviour
         return measure_behaviour(self.record)
+
+    @cached_property
+    def usual_rules(self) -> 'tuple[VehicleRules, ...]':
+        """Measure how each vehicle kept traffic rules, in the log's order."""
+        from crgame_ros.analysis.rules.vehicle_rules import measure_rules
+        return measure_rules(self.record, self.usual_criticality)
 
     @cached_property
     def usual_scores(self) -> 'RunScores':

@@ -14,6 +14,7 @@ from crgame_ros.analysis.tables.behaviour import VEHICLE_BEHAVIOUR
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TEXT
 from crgame_ros.analysis.tables.pairs import FOOTPRINTS, measure_column
 from crgame_ros.analysis.tables.part import declare, TablePart
+from crgame_ros.analysis.tables.rules import VEHICLE_RULES
 from crgame_ros.analysis.tables.score_columns import VEHICLE_SCORES
 from crgame_ros.game.driven_vehicle import DrivenAv, DrivenHuman
 from crgame_ros.vehicle.state import StateColumn
@@ -193,6 +194,7 @@ VEHICLE_PARTS = (
         Column('worst_pet_s', NUMBER, 's', 'least post-encroachment time', FOOTPRINTS,
                empty='it crossed no other path')), _criticality),
     TablePart(FOLLOWING_COLUMNS, _following),
+    VEHICLE_RULES,
     TablePart((
         *(Column(_count_name(key), INTEGER, '1', what, variant='as the engine told last',
                  empty=UNRECORDED)

@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 from crgame_ros.analysis.criticality.criticality import CHIEF, EXPOSURES
 from crgame_ros.analysis.criticality.criticality import MEASURES as CRITICALITY
 from crgame_ros.analysis.criticality.thresholds import USUAL
+from crgame_ros.analysis.rules.measures import MEASURES as RULES
 from crgame_ros.analysis.tables.column import FLAG, INTEGER, NUMBER
 from crgame_ros.analysis.tables.vehicles import VEHICLES
 from crgame_ros.errors import InputError, short
@@ -148,6 +149,8 @@ MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('worst_pet_s', 'least PET', 'worst_pet_s', 1),
     *(SummaryMeasure(name, each.told(USUAL).definition, name, -1)
       for name, each in EXPOSURES.items()),
+    *(SummaryMeasure(name, each.label[:1].lower() + each.label[1:], name, -1)
+      for name, each in RULES.items()),
     SummaryMeasure('distance', 'way', 'distance', 0),
     SummaryMeasure('mean_speed', 'mean speed', 'mean_speed', 0),
     SummaryMeasure('min_acceleration', 'hardest braking', 'min_acceleration', 1),

@@ -3,19 +3,11 @@
 """Stop lines: where agents halt for traffic lights and stop signs."""
 
 from collections.abc import Mapping
-import math
 from typing import NamedTuple
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
-from commonroad.scenario.traffic_light import TrafficLight
-from crgame_ros.roads.signals import LightCycle
-from crgame_ros.roads.signs import (
-    has_arrow,
-    has_stop_sign,
-    lights_for,
-    lights_of,
-    stop_line_middle,
-)
+from crgame_ros.roads.signals import governing_lights, RED_STATES
+from crgame_ros.roads.signs import has_stop_sign, lights_of, stop_line_middle
 from crgame_ros.traffic.compiling.compiled import compiled
 from crgame_ros.traffic.following.leaders import Ways
 from crgame_ros.traffic.lanes.lane_graph import FloatArray, IntArray, LaneGraph
@@ -27,11 +19,8 @@ YELLOW, RED = 1, 2
 # Lanes inside junctions by the lights before them: those who come from there wait, may drive, or
 # the light changes; lanes without lights are NO_LIGHT.
 NO_LIGHT, HELD, OPENED, CHANGES = 0, 1, 2, 3
-LEVELS = {'yellow': YELLOW, 'red': RED, 'redYellow': RED}
-RED_STATES = [state for state, level in LEVELS.items() if level == RED]
+LEVELS = {'yellow': YELLOW, **dict.fromkeys(RED_STATES, RED)}
 ARROWS = {STRAIGHT: 'straight', LEFT: 'left', RIGHT: 'right'}
-# Cycles of several lights are compared over at most this number of time steps.
-LONGEST_CYCLE = 20_000
 # Hardest braking for a light that is red, and for one that turns yellow [m/s^2].
 RED_BRAKING = 4.0
 YELLOW_BRAKING = 3.4
@@ -57,10 +46,8 @@ class StopLines:
     """
     The stop lines and traffic lights of all lanes.
 
-    A light without arrows applies to all vehicles, one with arrows to vehicles that go where they
-    point. The movement of a way is that of its first lane, from the one with the light on, whose
-    `movement` is decided. If no light applies to a movement, all lights do. If those that apply
-    are never all free at once, only those with arrows count.
+    Which lights apply to a movement is said by `governing_lights`. The movement of a way is that
+    of its first lane, from the one with the light on, whose `movement` is decided.
 
     :param graph: the lanes.
     :param roads: with the traffic lights and signs.
@@ -95,8 +82,9 @@ class StopLines:
                 self.line[lane] = self.at[lane] = self._position(lane, lanelet)
             lights = lights_of(lanelet, roads)
             if lights:
-                self._lights[lane] = {movement: _governing(lights, arrow)
-                                      for movement, arrow in ARROWS.items()}
+                self._lights[lane] = {movement: tuple(
+                    x.traffic_light_id for x in governing_lights(lights, arrow))
+                    for movement, arrow in ARROWS.items()}
                 self.number[lane] = len(rows)
                 rows.append(movements.after(lane))
                 if lanelet.stop_line is None and movements.is_first(lane):
@@ -191,24 +179,3 @@ def movement_of(lights: LightTable, way: Ways, i: int, step: int) -> int:
         if movement != UNDECIDED:
             return int(movement)
     return UNDECIDED
-
-
-def _governing(lights: list[TrafficLight], arrow: str) -> tuple[int, ...]:
-    """Return the ids of the lights that are for a movement."""
-    chosen = lights_for(lights, arrow)
-    arrows = [light for light in chosen if has_arrow(light)]
-    if 0 < len(arrows) < len(chosen) and _is_never_free(chosen):
-        chosen = arrows
-    return tuple(x.traffic_light_id for x in chosen)
-
-
-def _is_never_free(lights: list[TrafficLight]) -> bool:
-    """Return whether at least one of the lights is red at any time."""
-    red = [_red_steps(light) for light in lights]
-    step = np.arange(min(math.lcm(*(len(x) for x in red)), LONGEST_CYCLE))
-    return bool(np.any([x[step % len(x)] for x in red], axis=0).all())
-
-
-def _red_steps(light: TrafficLight) -> NDArray[np.bool_]:
-    """Return whether a light is red at each time step of its cycle."""
-    return np.isin(LightCycle(light).states_over(), RED_STATES)

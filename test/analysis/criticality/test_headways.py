@@ -13,9 +13,9 @@ def _ramp(*, stand: int = 0, alone: int = 0) -> Headways:
     headways = Headways()
     for step in range(60):
         gap = 5.0 + 0.5 * step
-        headways.add(Following(gap, gap + 4.5, 10.0), 7.0 if step < 15 else math.inf)
+        headways.add(Following(gap, gap + 4.5, 10.0, 1, 5.0, 0.0), 7.0 if step < 15 else math.inf)
     for _ in range(stand):
-        headways.add(Following(3.0, 7.5, 0.0), math.inf)
+        headways.add(Following(3.0, 7.5, 0.0, 1, 0.0, 0.0), math.inf)
     for _ in range(alone):
         headways.add(None, math.inf)
     return headways
