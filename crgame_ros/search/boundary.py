@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 # Candidates for the next runs, of which those nearest to the boundary are run.
 _POOL = 2048
+# Variants that are chosen with one model, at least: to learn it takes as long as some runs.
+_TOGETHER = 16
 # The model learns from so many runs at most: its cost grows with their cube.
 _MOST = 400
 # Candidates of one batch are at least so far apart, in the unit cube.
@@ -83,7 +85,7 @@ def refine_boundary(space: VariantSpace, trials: Trials, settings: SearchSetting
     """
     end = len(trials.outcomes) + runs
     turn = 0
-    while (count := min(2 * settings.batch, end - len(trials.outcomes))) > 0 \
+    while (count := min(max(_TOGETHER, settings.batch), end - len(trials.outcomes))) > 0 \
             and can_learn(trials.known):
         turn += 1
         pool = pool_of(space, _POOL, settings.seed + turn)

@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add('--seed', type=int, default=0, metavar='N', help='of the search (default: 0)')
     add('--sampler', choices=get_args(Sampler), default='tpe',
         help='of Optuna, that explores (default: tpe; nsga2 for several measures)')
-    add('--batch', type=int, default=8, metavar='N', help='variants that are chosen together, as '
+    add('--batch', type=int, default=4, metavar='N', help='variants that are chosen together, as '
         'many as there are workers or more (default: %(default)d)')
     add('--explore-only', action='store_true', help='only explore, with all runs')
     add('--unavoidable', action='store_true',

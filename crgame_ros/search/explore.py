@@ -13,7 +13,9 @@ from crgame_ros.variation.space import VariantSpace
 # Points asked for until one keeps the constraints.
 _ASKED = 100
 # Variants that are chosen by chance before there is something to learn from.
-_STARTUP = 10
+_STARTUP = 8
+# Candidates among which TPE takes the best; its default of 24 needs half as many runs again.
+_CANDIDATES = 96
 
 
 def explore(space: VariantSpace, trials: Trials, settings: SearchSettings, runs: int) -> None:
@@ -45,7 +47,7 @@ def _sampler(settings: SearchSettings) -> Any:
         return samplers.CmaEsSampler(seed=seed, n_startup_trials=_STARTUP,
                                      popsize=max(settings.batch, 5), with_margin=False)
     return samplers.TPESampler(seed=seed, n_startup_trials=_STARTUP, multivariate=True,
-                               constant_liar=True)
+                               constant_liar=True, n_ei_candidates=_CANDIDATES)
 
 
 class _Exploration:

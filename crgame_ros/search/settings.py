@@ -57,7 +57,7 @@ class SearchSettings:
     planner: str = ''
     options: dict[str, object] = field(default_factory=dict)
     budget: int = 500
-    batch: int = 8
+    batch: int = 4
     seed: int = 0
     sampler: Sampler = 'tpe'
     explore_only: bool = False
