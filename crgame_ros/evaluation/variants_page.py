@@ -9,7 +9,7 @@ from typing import Literal
 
 from crgame_ros.analysis.report.document import Article, Page
 from crgame_ros.analysis.report.section import Section
-from crgame_ros.analysis.report.text import free, plain
+from crgame_ros.analysis.report.text import free, number, plain, table
 from crgame_ros.paths import page_directory
 from crgame_ros.variation.space import Axis, Variant
 from crgame_ros.version import __version__
@@ -40,6 +40,25 @@ class VariantPoint:
 
 
 @dataclass(frozen=True)
+class Finding:
+    """
+    A variant with a folder of its own.
+
+    :param name: of the folder.
+    :param told: what it changes, in words.
+    :param values: of the goals.
+    :param report: address of its report, relative to the page.
+    :param command: with which a person drives in it.
+    """
+
+    name: str
+    told: str
+    values: Sequence[float | None]
+    report: str
+    command: str
+
+
+@dataclass(frozen=True)
 class VariantsView:
     """
     The content of the page.
@@ -53,7 +72,7 @@ class VariantsView:
     :param slices: probability of a failure over pairs of dimensions: names x and y, and rows of
         probabilities from low to high y.
     :param links: by cell, addresses relative to the page by what they are.
-    :param commands: for the terminal, with what each does.
+    :param findings: variants with a folder of their own.
     """
 
     title: str
@@ -64,7 +83,7 @@ class VariantsView:
     points: Sequence[VariantPoint]
     slices: Sequence[Mapping[str, object]] = ()
     links: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    commands: Sequence[tuple[str, str]] = ()
+    findings: Sequence[Finding] = ()
 
 
 def write_variants_page(view: VariantsView, folder: Path, name: str) -> Path:
@@ -82,9 +101,7 @@ def write_variants_page(view: VariantsView, folder: Path, name: str) -> Path:
         'over the other dimensions.</p>' if view.slices else ''
     sections = [
         Section('found', 'What was found', '<ul>' + ''.join(
-            f'<li>{plain(line)}</li>' for line in view.lines) + '</ul>' + ''.join(
-                f'<p>{plain(words)}: <code>{plain(command)}</code></p>'
-                for words, command in view.commands)),
+            f'<li>{plain(line)}</li>' for line in view.lines) + '</ul>' + _findings(view)),
         Section('variants', 'All variants', f'<p class="key">{key}</p>'
                 '<p class="note">A line is a variant; click on one, or on a point below, to see '
                 'it.</p><div id="lines"></div><div id="chosen" class="chosen-variant">'
@@ -102,6 +119,14 @@ def write_variants_page(view: VariantsView, folder: Path, name: str) -> Path:
         f'crgame_ros {__version__}', (page / 'variants.css').read_text(encoding='utf-8'),
         'variants/variants.ts', data).html(), path)
     return path
+
+
+def _findings(view: VariantsView) -> str:
+    rows = [(f'<a href="{plain(each.report)}">{plain(each.name)}</a>', plain(each.told),
+             *(number(value) for value in each.values), f'<code>{plain(each.command)}</code>')
+            for each in view.findings]
+    return table('Failures to look at', ('report', 'changed in the game', *map(plain, view.goals),
+                                         'drive in it yourself'), rows) if rows else ''
 
 
 def axis_values(axis: Axis) -> dict[str, object]:

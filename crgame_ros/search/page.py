@@ -7,13 +7,14 @@ from pathlib import Path
 
 from crgame_ros.evaluation.variants_page import (
     axis_values,
+    Finding,
     VariantPoint,
     VariantsView,
     write_variants_page,
 )
 from crgame_ros.search.findings import GAME, LIVE, REPORT
 from crgame_ros.search.search import SearchResult
-from crgame_ros.search.text import boundary_slices, lines, told, verdict
+from crgame_ros.search.text import boundary_slices, changes, lines, told, verdict
 from crgame_ros.search.trials import Outcome
 
 PAGE = 'index.html'
@@ -40,5 +41,7 @@ def write_search_page(result: SearchResult, found: Sequence[tuple[Outcome, Path]
         [VariantPoint(outcome.key, outcome.variant, outcome.values, verdict(outcome),
                       told(outcome)) for outcome in result.outcomes],
         list(boundary_slices(result)), links,
-        [(f'Drive in {place.name} yourself', f'./run.sh {place / LIVE}') for _, place in found])
+        [Finding(place.name, changes(result.space, outcome.variant), outcome.values,
+                 links[outcome.key]['report'], f'./run.sh {place / LIVE}')
+         for outcome, place in found])
     return write_variants_page(view, folder, PAGE)
