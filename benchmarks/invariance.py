@@ -23,7 +23,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
 
 from crgame_ros.errors import CrgameError  # noqa: E402, I100
-from placed_runs import difference, Placement, run_placed, UTM  # noqa: E402
+from crgame_ros.verdict.copies import Placement, UTM  # noqa: E402
+from placed_runs import difference, run_placed  # noqa: E402
 
 
 def main() -> None:

@@ -40,9 +40,10 @@ from crgame_ros.game.game import Game  # noqa: E402
 from crgame_ros.geometry.angles import wrap_pi_array  # noqa: E402
 from crgame_ros.schema.writing import write  # noqa: E402
 from crgame_ros.simulation.setup import build_setup  # noqa: E402
+from crgame_ros.verdict.copies import write_exactly  # noqa: E402
 from live_graph import LiveGraph  # noqa: E402
 import numpy as np  # noqa: E402
-from placed_runs import played_values, write_exactly  # noqa: E402
+from placed_runs import played_values  # noqa: E402
 import yaml  # noqa: E402
 
 LATENCIES = (0, 1, 5, 10, 12, 20, 40, 70, 100)

@@ -5,7 +5,8 @@
 from pathlib import Path
 
 from crgame_ros.paths import scenarios_directory
-from placed_runs import difference, Placement, run_placed, UTM
+from crgame_ros.verdict.copies import Placement, UTM
+from placed_runs import difference, run_placed
 import pytest
 
 DURATION_S = 4.0
