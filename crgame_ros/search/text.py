@@ -45,6 +45,11 @@ def lines(result: SearchResult) -> Iterator[str]:
         if found:
             value, outcome = min(found, key=lambda pair: (pair[0], pair[1].number))
             yield f'{goal.told}: {goal.sign * value:.4g} ({_values(outcome)})'
+    if len(result.settings.goals) > 1:
+        front = worst_compromises(result)
+        shown = '; '.join(_values(outcome) for outcome in front[:3])
+        yield (f'{len(front)} on the Pareto front, where no other variant is as bad in all and '
+               f'worse in one: {shown}{" …" if len(front) > 3 else ""}')
     if result.smallest is not None:
         yield f'smallest change that fails: {changes(result.space, result.smallest.variant)}'
     if result.boundary is not None:
@@ -54,6 +59,17 @@ def lines(result: SearchResult) -> Iterator[str]:
         yield (f'probability of a failure: {_share(estimate.value)} '
                f'(95 % interval {_share(estimate.low)} to {_share(estimate.high)}; '
                f'{estimate.runs} runs, {estimate.failures} of them failed)')
+
+
+def worst_compromises(result: SearchResult) -> list[Outcome]:
+    """Return the variants of which no other is as bad in all goals and worse in one (Pareto)."""
+    signs = [goal.sign for goal in result.settings.goals]
+    rated = [(tuple(sign * value for sign, value in zip(signs, outcome.values, strict=True)
+                    if value is not None), outcome)
+             for outcome in result.outcomes if None not in outcome.values and not outcome.excused]
+    return [outcome for values, outcome in rated if not any(
+        other != values and all(a <= b for a, b in zip(other, values, strict=True))
+        for other, _ in rated)]
 
 
 def _share(value: float) -> str:
