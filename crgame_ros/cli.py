@@ -183,6 +183,9 @@ def _add_offline(parser: argparse.ArgumentParser) -> None:
     add('--out', type=Path, metavar='PATH',
         help='write the run as a CommonRoad scenario: a file (*.xml) or a folder; or as '
         'OpenSCENARIO: a file (*.xosc)')
+    add('--record', type=Path, metavar='DIR',
+        help='write the run as a recording, and game.yaml, into a folder, as a live run does: '
+        '`crgame run --replay DIR` shows it in the page')
     parser.set_defaults(command=_offline)
 
 
@@ -208,6 +211,7 @@ def _offline(values: argparse.Namespace) -> int:
     from crgame_ros.launcher.run_plan import effective_setup, naming
     from crgame_ros.python_interface.offline_runs import drive
     from crgame_ros.recording.export import prepare_folder
+    from crgame_ros.recording.offline_recording import check_run_folder
     if values.latency < 0:
         raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
     request = RunRequest(game=values.game, scenario=values.scenario, driver=values.driver,
@@ -222,9 +226,12 @@ def _offline(values: argparse.Namespace) -> int:
             raise InputError(f'{setup.game.duration} s are less than a time step of the scenario',
                              '--duration', f'give {setup.scheduler.time_step_s} s or more')
         prepare_folder(values.out)
+    if values.record is not None:
+        check_run_folder(values.record)
     say = partial(print, file=sys.stderr, flush=True)
     with naming(request):
-        run = drive(setup.loaded.benchmark_id, setup, values.latency, values.trigger, say)
+        run = drive(setup.loaded.benchmark_id, setup, values.latency, values.trigger, say,
+                    keep_messages=values.record is not None)
     print(json.dumps(run.summary(), indent=2))
     if count := run.result.taken_off:
         print(f'note: removed {count} agent{"s" if count > 1 else ""} of the traffic, because '
@@ -232,6 +239,8 @@ def _offline(values: argparse.Namespace) -> int:
     if values.out is not None:
         for notice in run.exported(values.out)[1]:
             print(f'note: {notice}', file=sys.stderr)
+    if values.record is not None:
+        print(f'recording: {run.save_recording(values.record)}', file=sys.stderr)
     assert run.outcome is not None
     return tell_outcome(say, run.outcome, run.usual_criticality, scores=run.drive_scores)
 

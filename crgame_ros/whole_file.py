@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Writing files that are complete or absent, even if the process or the machine stops."""
+"""Writing files and folders that are complete or absent, even if the machine stops."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 import glob
 import os
 from pathlib import Path
+import shutil
 
 from crgame_ros.errors import InputError
 
@@ -57,16 +58,47 @@ def whole_file(path: Path, suffix: str = '.part') -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """
+    Yield a folder of the same name elsewhere, which is moved to its place once all is written.
+
+    The files in it must be on the disk by then.
+
+    :param path: of the folder; an earlier one there is replaced.
+    :raises OSError: if it cannot be written; an earlier folder is unchanged.
+    """
+    part = part_of(path)
+    try:
+        part.mkdir()
+        yield part / path.name
+        before = part / 'before'
+        if path.exists():
+            path.rename(before)
+        try:
+            (part / path.name).rename(path)
+        except OSError:
+            if before.exists():
+                before.rename(path)
+            raise
+        sync_folder(path.parent)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
 def part_of(path: Path, suffix: str = '.part') -> Path:
     """
-    Return the name under which this process writes a file before it is whole.
+    Return the name under which this process writes a file or folder before it is whole.
 
-    What killed processes have left of the same file is removed.
+    What killed processes have left of the same one is removed.
     """
     for left in path.parent.glob(f'.{glob.escape(path.name)}.*{suffix}'):
         pid = left.name.removesuffix(suffix).rpartition('.')[2]
         if pid.isdecimal() and not Path('/proc', pid).exists():
-            left.unlink(missing_ok=True)
+            if left.is_dir():
+                shutil.rmtree(left, ignore_errors=True)
+            else:
+                left.unlink(missing_ok=True)
     return path.with_name(f'.{path.name}.{os.getpid()}{suffix}')
 
 

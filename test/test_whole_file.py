@@ -9,7 +9,7 @@ import time
 
 from crgame_ros.recording.writer import BagWriter
 from crgame_ros.study.session_journal import JOURNAL, SessionJournal
-from crgame_ros.whole_file import write_whole
+from crgame_ros.whole_file import whole_folder, write_whole
 import pytest
 
 
@@ -49,6 +49,20 @@ def test_what_cannot_be_written_leaves_what_was_there(tmp_path: Path) -> None:
     with pytest.raises(OSError):
         write_whole(b'new', path)
     assert path.read_bytes() == b'old'
+
+
+def test_a_folder_is_replaced_once_the_new_one_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / 'folder'
+    for content in ('old', 'new'):
+        with whole_folder(path) as part:
+            part.mkdir()
+            (part / content).touch()
+            assert part.name == 'folder' and not (path / content).exists()
+    with pytest.raises(ZeroDivisionError), whole_folder(path) as part:
+        part.mkdir()
+        raise ZeroDivisionError
+    assert [item.relative_to(tmp_path).as_posix() for item in tmp_path.rglob('*')] == [
+        'folder', 'folder/new']
 
 
 def test_a_recording_is_on_the_disk_before_its_metadata(

@@ -15,7 +15,7 @@ from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOP
 from crgame_ros.recording.epochs import Epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import CYCLE_TOPIC
-from crgame_ros.recording.run_points import TRAJECTORY
+from crgame_ros.recording.standard_messages import TRAJECTORY
 from crgame_ros.recording.storage import BagMessage
 from crgame_ros.timing.cycle_rows import CycleTable
 import numpy as np

@@ -14,10 +14,15 @@ from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup, with_planners
 from crgame_ros.planner.registry import PLANNERS
 from crgame_ros.python_interface.finished_run import Run
-from crgame_ros.python_interface.games import argument_names, as_game, FileName
+from crgame_ros.python_interface.games import argument_names, as_game, as_path, FileName
 from crgame_ros.python_interface.own_planners import name_planners, PlannerLike
 from crgame_ros.recording.conversion import write_openscenario
 from crgame_ros.recording.export import scenario_path, write_scenario
+from crgame_ros.recording.offline_recording import (
+    check_run_folder,
+    GAME_FILE,
+    write_recording,
+)
 from crgame_ros.recording.progress import Progress
 from crgame_ros.recording.recorded_inputs import (
     inputs_of,
@@ -29,6 +34,7 @@ from crgame_ros.recording.run_formats import OPENSCENARIO
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import Setup
+from crgame_ros.whole_file import write_text
 import numpy as np
 from numpy.typing import NDArray
 
@@ -108,6 +114,20 @@ class OfflineRun(Run):
         """Return the states (N, 8) of its vehicles at the simulation steps from 0 on."""
         return {name: self.result.states_of(name) for name in self.result.setup.vehicle_ids}
 
+    def save_recording(self, folder: FileName) -> Path:
+        """
+        Write the run as a recording and `game.yaml` into a folder, as a live run does.
+
+        :return: the folder.
+        :raises InputError: if the run has not kept its messages, the folder holds a recording or
+            a game, or it cannot be written.
+        """
+        place = as_path(folder, 'folder')
+        check_run_folder(place)
+        write_recording(self.result, place)
+        write_text(self.result.setup.game.dump(), place / GAME_FILE)
+        return place
+
     def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
         """Write the scenario; return its file, and the parts that it does not express."""
         if out.suffix == OPENSCENARIO:
@@ -121,7 +141,7 @@ def run(game: Game | FileName | None = None, *,
         options: Mapping[str, object] | None = None, driver: str | None = None,
         seed: int | None = None, duration_s: float | None = None, rate_hz: float | None = None,
         latency_steps: int = 0, triggers: Mapping[str, float] | None = None,
-        problems: Sequence[int] = ()) -> OfflineRun:
+        problems: Sequence[int] = (), keep_messages: bool = False) -> OfflineRun:
     """
     Run a game on a virtual clock, planners in lockstep: equal arguments give equal states.
 
@@ -137,6 +157,7 @@ def run(game: Game | FileName | None = None, *,
     :param latency_steps: simulation steps between a request and its plan.
     :param triggers: events of the game to trigger, with times after the start [s]
     :param problems: planning problems that become AVs, if the game names no AVs.
+    :param keep_messages: keep requests and plans, which `save_recording` needs.
     :raises InputError: if an argument cannot be used.
     """
     # With a recorded driver and no game, the recording's game is used.
@@ -153,12 +174,14 @@ def run(game: Game | FileName | None = None, *,
         if options is not None:
             setup = _with_options(setup, options)
         name = setup.game.title or setup.loaded.benchmark_id
-        return drive(name, setup, latency_steps, list((triggers or {}).items()))
+        return drive(name, setup, latency_steps, list((triggers or {}).items()),
+                     keep_messages=keep_messages)
 
 
 def drive(name: str, setup: Setup, latency_steps: int = 0,
           triggers: Sequence[tuple[str, float]] = (),
-          say: Callable[[str], object] = lambda _: None) -> OfflineRun:
+          say: Callable[[str], object] = lambda _: None,
+          keep_messages: bool = False) -> OfflineRun:
     """
     Run a setup, with the recorded inputs of humans whose driver is a recording.
 
@@ -166,6 +189,7 @@ def drive(name: str, setup: Setup, latency_steps: int = 0,
     :param latency_steps: simulation steps between a request and its plan.
     :param triggers: names of events, with their times after the start [s]
     :param say: called with each text about failing planners, and about progress.
+    :param keep_messages: whether a recording of the run is wanted.
     :raises InputError: as `run_offline`; if the latency is negative.
     """
     if latency_steps < 0:
@@ -175,7 +199,8 @@ def drive(name: str, setup: Setup, latency_steps: int = 0,
     began_s = time.perf_counter()
     result = run_offline(setup, latency_steps=latency_steps, drivers=drivers,
                          intervals_s=intervals_s, clock_s=time.perf_counter, triggers=steps,
-                         say=say, progress=Progress(say, f'driving {name}'))
+                         say=say, progress=Progress(say, f'driving {name}'),
+                         keep_messages=keep_messages)
     return OfflineRun(name, result, time.perf_counter() - began_s)
 
 

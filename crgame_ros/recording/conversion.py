@@ -147,7 +147,8 @@ def _check_road(road: Path | None) -> None:
         raise InputError('there is no such file', str(road), 'name an OpenDRIVE file')
 
 
-def day_of(bag: Path) -> date:
-    """Return the day on which a recording began, in UTC."""
+def day_of(bag: Path) -> date | None:
+    """Return the day on which a recording began, in UTC; None for that of an offline run."""
     with BagReader(bag) as reader:
-        return datetime.fromtimestamp(reader.start_ns * 1e-9, UTC).date()
+        return None if reader.has_virtual_clock else datetime.fromtimestamp(
+            reader.start_ns * 1e-9, UTC).date()

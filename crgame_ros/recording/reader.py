@@ -4,7 +4,6 @@
 
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterator, Sequence
-from functools import cache
 from pathlib import Path
 import struct
 from types import TracebackType
@@ -16,10 +15,10 @@ from crgame_ros.recording.mcap_file import McapFile
 from crgame_ros.recording.metadata import METADATA_FILE, read_metadata
 from crgame_ros.recording.run_folder import parts_of
 from crgame_ros.recording.schemas import is_foreign
+from crgame_ros.recording.standard_messages import standard_types
 from crgame_ros.recording.storage import BagMessage, McapStorage, RosbagsStorage, Storage
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores, TypesysError
-from rosbags.typesys.store import Typestore
 
 _WATCHED_EVERY = 1000
 _SUFFIXES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
@@ -82,7 +81,7 @@ class BagReader:
         self.topics = {topic.name: topic for topic in self._storage.topics}
         self.start_ns, self.end_ns = self._storage.start_ns, self._storage.end_ns
         self.notices = self._storage.damages + notices
-        self._types = _standard_types()
+        self._types = standard_types()
         # Count by topic of messages that cannot belong to a run.
         self.foreign: Counter[str] = Counter()
 
@@ -90,6 +89,11 @@ class BagReader:
     def complete(self) -> bool:
         """Return whether the recorder finished its work; if not, see `notices`."""
         return not self.notices
+
+    @property
+    def has_virtual_clock(self) -> bool:
+        """Return whether its log times are those of the simulation: it is of an offline run."""
+        return self.start_ns == 0 and self.message_count > 0
 
     @property
     def foreign_notices(self) -> tuple[str, ...]:
@@ -205,7 +209,7 @@ class BagReader:
                              'recording does not define', str(self.path),
                              'leave this topic out, or record in MCAP storage')
         found = get_types_from_msg(definition, type_name)
-        if self._types is _standard_types():
+        if self._types is standard_types():
             # Recordings may define a type differently.
             self._types = get_typestore(Stores.ROS2_JAZZY)
         self._types.register({name: fields for name, fields in found.items()
@@ -221,12 +225,6 @@ class BagReader:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
         self.close()
-
-
-@cache
-def _standard_types() -> Typestore:
-    """Return the types of ROS 2 Jazzy, whose code is generated once for all recordings."""
-    return get_typestore(Stores.ROS2_JAZZY)
 
 
 def _files_of(family: Sequence[Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:

@@ -15,7 +15,6 @@ from crgame_ros.recording.storage import BagMessage
 import numpy as np
 from numpy.typing import NDArray
 
-TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 # Offset of the names, after the encapsulation and the stamp.
 _NAMES = 12
 _COUNT = struct.Struct('<I')

@@ -33,7 +33,8 @@ from crgame_ros.recording.gap_filling import (
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.resampling import moved_intervals, resample
 from crgame_ros.recording.run_cycles import cycle_tables, table_of
-from crgame_ros.recording.run_points import read_points, TRAJECTORY
+from crgame_ros.recording.run_points import read_points
+from crgame_ros.recording.standard_messages import TRAJECTORY
 from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.timing.cycle_rows import CycleTable

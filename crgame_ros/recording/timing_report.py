@@ -108,6 +108,7 @@ REPORT_KEYS = frozenset((
     'gaps', 'scenario_steps', 'planners', 'drivability', 'contacts', 'benchmark_id', 'epoch',
     'notices', 'final_error_ms', 'mean_step_error_ms', 'max_cumulative_error_ms', 'timeout_ratio',
     'real_time_ratio', 'time_efficiency', 'precision_ratio'))
+_VIRTUAL = 'the run was offline, on a virtual clock that is never late: no timing was measured'
 # Prefix in the status of a tracked AV.
 _WORST = 'worst_'
 
@@ -160,7 +161,8 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
                 *(() if log is None else log.notices), *reader.notices, *reader.foreign_notices,
                 *(f'/{av}/plan: {each.of_others} plans of other programs than its planner, '
                   'which were not taken' for av, each in planners.items() if each.of_others),
-                *unknown, *filter(None, [slowness(summary['real_time_ratio']['final'])])))]}
+                *unknown, *([_VIRTUAL] if reader.has_virtual_clock else []),
+                *filter(None, [slowness(summary['real_time_ratio']['final'])])))]}
 
 
 def write_timing_report(bag: Path, path: Path, epoch: int | None = None,

@@ -12,16 +12,21 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.task_documents import TaskEntry
 from crgame_ros.messages.joints import JointSeries, plan_to_joints
+from crgame_ros.messages.status_values import Status
 from crgame_ros.perception.perception import Perception
 from crgame_ros.planner.adapter import PlannerStatistics
 from crgame_ros.planner.failure_lines import FailureLines
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.manager import PlannerManager
 from crgame_ros.planner.request_reader import RequestReader
+from crgame_ros.planner.status import planner_status
 from crgame_ros.simulation.autonomous_vehicle import AvCounters
 from crgame_ros.simulation.av_models import make_perception, published_states
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.observer import drivability_monitor, ObservedRun, RunObserver
+from crgame_ros.simulation.plan_requests import request_topic
+from crgame_ros.simulation.plan_status import refusal_status
+from crgame_ros.simulation.run_messages import MessageLog, RunMessage
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.driver_command import COMMAND_WIDTH, RELEASED
@@ -106,6 +111,8 @@ class OfflineResult:
         for the lights, while it followed its plan.
     :param tasks: the entries of the game's tasks, in order.
     :param taken_off: number of agents that were removed because they blocked each other.
+    :param messages: what planners were asked and have answered, statuses and signals, in order;
+        None unless the run was told to keep them.
     """
 
     setup: Setup
@@ -123,6 +130,7 @@ class OfflineResult:
         default_factory=lambda: np.empty((0, 0, COMMAND_WIDTH)))
     tasks: tuple[TaskEntry, ...] = ()
     taken_off: int = 0
+    messages: tuple[RunMessage, ...] | None = None
 
     def states_of(self, vehicle_id: str) -> NDArray[np.float64]:
         """Return the states (n + 1, 8) of one driven vehicle."""
@@ -134,12 +142,16 @@ class PlannerSeat:
 
     def __init__(self, setup: Setup, av_index: int, simulation: Simulation, latency_steps: int,
                  clock_s: Callable[[], float] | None,
-                 say: Callable[[str], object] = lambda _: None) -> None:
+                 say: Callable[[str], object] = lambda _: None,
+                 log: MessageLog | None = None) -> None:
         av = setup.avs[av_index]
         self.id = av.id
+        self._request_topic = request_topic(av).replace('<av>', av.id)
+        self._log = log
         self._latency = latency_steps
         self._simulation = simulation
-        self._due: list[tuple[int, JointSeries]] = []
+        # Plans with their steps, and with what their planner tells then.
+        self._due: list[tuple[int, JointSeries, Status | None]] = []
         objects = {item.id: item for item in setup.descriptions}
         self._reader = RequestReader(av.id, objects, simulation.scheduler)
         context = PlannerContext(
@@ -167,19 +179,33 @@ class PlannerSeat:
 
     def ask(self, request: JointSeries) -> None:
         """Plan now; the answer is due after the latency (immediately for the first request)."""
+        if self._log is not None:
+            self._log.add(self._request_topic, request)
         if self.perception is not None:
             request = self.perception.perceive(request)
             self._simulation.request_perceived(self.id, request)
-        plan = self.manager.plan(self._reader.read(request))
+            if self._log is not None:
+                self._log.add(f'/{self.id}/plan_request', request)
+        read = self._reader.read(request)
+        plan = self.manager.plan(read)
         self._failures.note(self.manager)
         series = plan_to_joints(plan, self.id, self._simulation.scheduler.time_step_ns)
+        status = None if self._log is None else planner_status(
+            self.id, read.k, plan, self.manager)
         n = self._simulation.n
-        self._due.append((n + (self._latency if n else 0), series))
+        self._due.append((n + (self._latency if n else 0), series, status))
 
     def deliver(self) -> None:
         """Deliver the answers that are due before the next step."""
         while self._due and self._due[0][0] <= self._simulation.n:
-            self._failures.refuse(self._simulation.offer_plan(self.id, self._due.pop(0)[1]))
+            _, series, status = self._due.pop(0)
+            reason = self._simulation.offer_plan(self.id, series)
+            self._failures.refuse(reason)
+            if self._log is not None:
+                self._log.add(f'/{self.id}/plan', series)
+                self._log.add_status(status)
+                if reason is not None:
+                    self._log.add_status(refusal_status(self.id, reason, self._simulation.n))
 
     def record(self) -> PlannerRecord:
         """Return the results of the planner."""
@@ -197,7 +223,7 @@ def run_offline(
     observers: Sequence[RunObserver] = (),
     traces: Mapping[str, NDArray[np.float64]] | None = None,
     say: Callable[[str], object] = lambda _: None,
-    progress: Callable[[float], object] = lambda _: None,
+    progress: Callable[[float], object] = lambda _: None, keep_messages: bool = False,
 ) -> OfflineResult:
     """
     Run a game as fast as possible.
@@ -216,6 +242,7 @@ def run_offline(
     :param traces: (N, 8) states by human, from step 0 on, that replace driving.
     :param say: called with each text about a planner that fails.
     :param progress: called with the share of the run that is done, 0 to 1, at each step.
+    :param keep_messages: keep `OfflineResult.messages`, which a recording of the run needs.
     :raises InputError: if a human's driver needs a person or a device, or a trigger is refused.
     """
     simulation = Simulation(setup, traces=traces)
@@ -224,7 +251,8 @@ def run_offline(
     hands = [drivers.get(human.id) or offline_driver(setup, index)
              for index, human in enumerate(setup.humans)]
     takers = [drivers.get(av.id) for av in setup.avs]
-    seats = [PlannerSeat(setup, index, simulation, latency_steps, clock_s, say)
+    log = MessageLog(simulation) if keep_messages else None
+    seats = [PlannerSeat(setup, index, simulation, latency_steps, clock_s, say, log)
              for index in range(len(setup.avs))]
     trace = _Trace(setup, steps, check_drivability, observers)
     dt_s = simulation.scheduler.dt_s
@@ -238,6 +266,8 @@ def run_offline(
             perceive(simulation, perceiving)
         for seat in seats:
             seat.proceed(result)
+        if log is not None:
+            log.add_step(result)
         trace.add(simulation, result, effective_s)
         if trace.stop is not None:
             break
@@ -252,8 +282,10 @@ def run_offline(
         result = simulation.step(effective_s, commands)
         progress(simulation.n / steps)
     else:
+        if log is not None:
+            log.add_step(result)
         trace.add(simulation, result, effective_s)
-    return trace.result(simulation, {seat.id: seat.record() for seat in seats})
+    return trace.result(simulation, {seat.id: seat.record() for seat in seats}, log)
 
 
 def observed_run(setup: Setup) -> ObservedRun:
@@ -321,15 +353,18 @@ class _Trace:
         """Return the violation that ends the run, once there is one."""
         return None if self._drivability is None else self._drivability.stop
 
-    def result(self, simulation: Simulation,
-               planners: Mapping[str, PlannerRecord]) -> OfflineResult:
+    def result(self, simulation: Simulation, planners: Mapping[str, PlannerRecord],
+               log: MessageLog | None) -> OfflineResult:
         count = simulation.n + 1
+        if log is not None:
+            log.add_plans()
         return OfflineResult(
             simulation.setup, simulation.state_hash(), self.vehicles[:count],
             np.array(self.objects), np.array(self.object_velocities), self.commands[:count],
             self.intervals_s[:count], planners,
             () if self._drivability is None else self._drivability.report(), simulation.fired,
-            self.stop, self.av_commands[:count], tuple(self.tasks), simulation.taken_off)
+            self.stop, self.av_commands[:count], tuple(self.tasks), simulation.taken_off,
+            None if log is None else tuple(log.messages))
 
     def add(self, simulation: Simulation, result: StepResult, effective_s: float) -> None:
         """Add a state, and the interval of the step that led to it [s]."""

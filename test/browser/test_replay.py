@@ -12,8 +12,12 @@ from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality
 from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.cockpit.frames import STATE_COLUMNS
 from crgame_ros.cockpit.replay_backend import ReplayBackend
+from crgame_ros.game.file import load_game
+from crgame_ros.paths import default_game
+from crgame_ros.recording.offline_recording import write_recording
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
-from crgame_ros.simulation.offline import OfflineResult
+from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.setup import build_setup
 import numpy as np
 import pytest
 from selenium.webdriver.common.action_chains import ActionChains
@@ -109,6 +113,25 @@ def test_poses_are_those_of_the_bag(page: Browser, log: RunTrajectories,
     # The bag's poses are those that were driven.
     np.testing.assert_array_equal(log.vehicle_states[:, :, :3],
                                   first_run.vehicle_states[::10, :, :3])
+
+
+def test_the_recording_of_an_offline_run_plays(browser: Browser, tmp_path: Path) -> None:
+    """Its vehicles and plans are drawn, at the time that the time line is at."""
+    result = run_offline(build_setup(load_game(default_game())), duration_s=8.0,
+                         keep_messages=True)
+    with served(ReplayBackend(write_recording(result, tmp_path))) as server:
+        browser.open(server.address)
+        browser.wait('window.crgame?.replay?.info && crgame.world.shown')
+        # In the second chunk, which begins with what is in force.
+        frame = seek(browser, 6.2)
+        np.testing.assert_array_equal(frame['vehicles'][:, :3], result.vehicle_states[620, :, :3])
+        # The plan of the AV, which is the second vehicle, has been followed since this tick.
+        assert browser.run('return crgame.store.plans.get(1).n') == 620
+        slider = browser.driver.find_element(By.ID, 'timeline-slider')
+        assert slider.get_attribute('value') == '620'
+        slider.send_keys(Keys.END)
+        browser.wait('crgame.replay.n === 800')
+        assert browser.console_errors() == []
 
 
 @pytest.mark.exhaustive

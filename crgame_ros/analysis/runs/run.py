@@ -228,11 +228,11 @@ class Run:
 
     @cached_property
     def began_ns(self) -> int | None:
-        """Return the log time of its first message since 1970 [ns]; None for an offline run."""
+        """Return the log time of its first message since 1970 [ns]; None of an offline run."""
         if self.bag is None:
             return None
         with BagReader(self.bag, parts=True) as reader:
-            return reader.start_ns or None
+            return None if reader.has_virtual_clock else reader.start_ns or None
 
     @cached_property
     def timed(self) -> 'TimedRun':
