@@ -7,6 +7,7 @@ from concurrent.futures import as_completed, ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 import multiprocessing
 from pathlib import Path
+import shlex
 import time
 
 from crgame_ros.errors import CrgameError, InputError
@@ -16,6 +17,11 @@ from crgame_ros.game.game import Game
 from crgame_ros.whole_file import write_text
 
 REPORT = 'report.html'
+
+
+def replay_command(folder: Path) -> str:
+    """Return the command that shows the recording in the folder of a run in the page."""
+    return f'crgame run --replay {shlex.quote(str(folder))}'
 
 
 @dataclass(frozen=True)
@@ -50,7 +56,8 @@ class CaseResult:
     :param broken: for each of them, how the run broke it, a line for each vehicle.
     :param error: why it could not be run; empty if it could.
     :param wall_s: time that it took.
-    :param folder: with report and scenario of a run that broke something; None without.
+    :param folder: with report, recording and scenario of a run that broke something; None
+        without.
     """
 
     case: Case
@@ -98,7 +105,7 @@ def run_case(case: Case, out: Path) -> CaseResult:
     """
     Run a case, and judge it.
 
-    :param out: folder for the reports of runs that break an expectation.
+    :param out: folder for the reports and recordings of runs that break an expectation.
     """
     # Imported here: the process that only hands cases out does not need them.
     from crgame_ros.analysis.report.file import write_report
@@ -106,6 +113,7 @@ def run_case(case: Case, out: Path) -> CaseResult:
     from crgame_ros.evaluation.judging import check_expectations, shortfalls
     from crgame_ros.evaluation.results.cell_rows import vehicle_rows
     from crgame_ros.recording.export import write_scenario
+    from crgame_ros.recording.offline_recording import GAME_FILE, write_recording
     from crgame_ros.simulation.offline import run_offline
     from crgame_ros.simulation.setup import build_setup
     began = time.perf_counter()
@@ -115,7 +123,7 @@ def run_case(case: Case, out: Path) -> CaseResult:
         expectations = game.expect
         check_expectations(game, str(case.game))
         game = _adapted(game, case)
-        result = run_offline(build_setup(game))
+        result = run_offline(build_setup(game), keep_messages=True)
         run = Run(case.name, result=result, scoring='drives')
         rows = vehicle_rows(run, result)
         broken = tuple(tuple(shortfalls(each, rows)) for each in expectations)
@@ -124,8 +132,9 @@ def run_case(case: Case, out: Path) -> CaseResult:
             folder = out / f'{case.game.stem}-{case.seed}'
             folder.mkdir(parents=True, exist_ok=True)
             write_report([run], folder / REPORT)
+            write_recording(result, folder, replace=True)
             write_scenario(run.log, folder)
-            write_text(game.dump(), folder / 'game.yaml')
+            write_text(game.dump(), folder / GAME_FILE)
     except CrgameError as error:
         return CaseResult(case, expectations, (), str(error), time.perf_counter() - began)
     return CaseResult(case, expectations, broken, '', time.perf_counter() - began, folder)

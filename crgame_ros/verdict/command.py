@@ -46,7 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add('--rerun-failed', action='store_true', help='only what failed the last time')
     add('--junit', type=Path, metavar='FILE.xml', help='write the verdicts as JUnit XML')
     add('--out', type=Path, metavar='DIR', default=Path('verdicts'),
-        help='folder for the page, and for the reports of failing runs (default: verdicts)')
+        help='folder for the page, and for reports and recordings of failing runs (default: '
+        'verdicts)')
     parser.set_defaults(command=run)
 
 
@@ -57,7 +58,7 @@ def run(values: argparse.Namespace) -> int:
     :return: exit code: 0 if every expectation is kept, else 1.
     :raises InputError: if there is nothing to run, or a file cannot be written.
     """
-    from crgame_ros.verdict.cases import REPORT, run_cases
+    from crgame_ros.verdict.cases import replay_command, REPORT, run_cases
     from crgame_ros.verdict.page import write_page
     from crgame_ros.verdict.verdicts import broken_lines, junit_xml, verdicts_of
     from crgame_ros.whole_file import write_bytes, write_text
@@ -78,6 +79,7 @@ def run(values: argparse.Namespace) -> int:
     for result in results:
         if result.folder is not None:
             print(f'       {result.case.name}: {result.folder / REPORT}')
+            print(f'       {" " * len(result.case.name)}  {replay_command(result.folder)}')
     if values.junit is not None:
         write_bytes(junit_xml(verdicts, 'crgame test'), values.junit)
     page = write_page(verdicts, results, values.out)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
+from crgame_ros.cockpit.replay_backend import ReplayBackend
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.judging import check_expectations, shortfalls
 from crgame_ros.game.expectation import Expectation
@@ -72,6 +73,7 @@ def test_a_planner_that_looks_at_nothing_fails(tmp_path: Path) -> None:
     assert lines[0] == 'FAILED cut_in.yaml: AVs: collision at most 0: 0 of 2 runs, 0 % (0 to 66 %)'
     assert lines[1] == '       seed 0: av0: collision is 1'
     assert lines[-1].startswith('1 game, 2 runs: 1 passed, 1 failed in ')
+    assert '                  crgame run --replay verdicts/cut_in-1' in lines
     suite = ElementTree.parse(tmp_path / 'junit.xml').getroot()[0]
     assert {name: suite.get(name) for name in ('tests', 'failures')} == {
         'tests': '2', 'failures': '1'}
@@ -80,7 +82,18 @@ def test_a_planner_that_looks_at_nothing_fails(tmp_path: Path) -> None:
     failed = tmp_path / 'verdicts' / 'cut_in-0'
     assert (failed / 'report.html').stat().st_size > 10_000
     assert not schema_errors(etree.parse(next(failed.glob('*.xml'))).getroot())
-    assert 'href="cut_in-0/report.html"' in (tmp_path / 'verdicts' / 'index.html').read_text()
+    page = (tmp_path / 'verdicts' / 'index.html').read_text()
+    assert 'href="cut_in-0/report.html"' in page
+    assert '<code>crgame run --replay verdicts/cut_in-0</code>' in page
+    # The page shows the recording, with the contact on its time line.
+    backend = ReplayBackend(failed)
+    try:
+        events = backend.info()['events']
+        assert isinstance(events, list)
+        assert {(event['kind'], event['subject']) for event in events} == {
+            ('collision', 'hv0'), ('collision', 'av0')}
+    finally:
+        backend.close()
     # A run that failed is run again from its folder, and only such runs by --rerun-failed.
     assert run(tmp_path, str(failed / 'game.yaml'), '--out', 'again')[0] == 1
     code, out, _ = run(tmp_path, '.', '--seeds', '2', '--rerun-failed', '-k', 'cut')
