@@ -3,10 +3,12 @@
 """Writing and reading the values of a status, which ROS's diagnostics carry as text."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+# Levels of a status.
+OK, WARN, ERROR = 0, 1, 2
 # Begins the text of a planner that has found no plan; the reason follows.
 BRAKING = 'braking: '
 
@@ -16,6 +18,11 @@ def status_text(value: object) -> str:
     if isinstance(value, bool | np.bool_):
         return 'true' if value else 'false'
     return str(value)
+
+
+def printable(text: str) -> str:
+    """Return a text fit for a message, without lone surrogates, which cannot be encoded."""
+    return text.encode('utf-8', 'replace').decode('utf-8')
 
 
 def status_truth(values: Mapping[str, str], key: str, default: bool = False) -> bool:
@@ -30,6 +37,17 @@ class Status(NamedTuple):
     level: int
     text: str
     values: dict[str, str]
+
+    @classmethod
+    def of(cls, name: str, level: int, text: str, values: Mapping[str, object]) -> Self:
+        """
+        Return a status as it is sent.
+
+        :param name: node and subject, `<node>: <subject>`.
+        """
+        return cls(printable(name), level, printable(text),
+                   {printable(key): printable(status_text(value))
+                    for key, value in values.items()})
 
 
 def read_status(message: Any) -> Status:

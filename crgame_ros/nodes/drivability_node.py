@@ -6,11 +6,11 @@ from collections.abc import Sequence
 import time
 
 from crgame_ros.drivability.monitor import DrivabilityMonitor, VehicleDrivability
+from crgame_ros.drivability.status import drivability_status
 from crgame_ros.game.game import DrivabilitySpec
 from crgame_ros.ros.node_main import run_node
 from crgame_ros.ros.observer_node import ObserverNode
 from crgame_ros.simulation.observer import drivability_monitor, ObservedRun
-from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.publisher import Publisher
 
 HEARTBEAT_S = 1.0
@@ -50,17 +50,9 @@ class DrivabilityNode(ObserverNode[DrivabilityMonitor]):
         self._report(due, stamp_ns)
 
     def _report(self, verdicts: Sequence[VehicleDrivability], stamp_ns: int) -> None:
-        spec = self._spec
         for verdict in verdicts:
-            faults = verdict.faults
-            self._reports[verdict.vehicle_id].publish(self.endpoints.diagnostics.array(
-                f'{verdict.vehicle_id}/drivability',
-                DiagnosticStatus.ERROR if faults else DiagnosticStatus.OK,
-                '; '.join(faults) or 'valid',
-                {'collision': verdict.collision if spec.collision else 'off',
-                 'road_compliance': not verdict.off_road if spec.road else 'off',
-                 'hit': ','.join(verdict.hit), 'n': verdict.n,
-                 'stop': verdict.stop_requested}, stamp_ns))
+            self._reports[verdict.vehicle_id].publish(self.endpoints.diagnostics.array_of(
+                drivability_status(verdict, self._spec), stamp_ns))
 
 
 def main(args: list[str] | None = None) -> None:

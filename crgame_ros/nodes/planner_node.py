@@ -12,11 +12,11 @@ from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joint_messages import from_joint_trajectory, MAP
 from crgame_ros.messages.joints import plan_to_joints
 from crgame_ros.messages.plan import Plan
-from crgame_ros.messages.status_values import BRAKING
 from crgame_ros.planner.failure_lines import FailureLines
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.manager import PlannerManager, swapped_in
 from crgame_ros.planner.request_reader import RequestReader
+from crgame_ros.planner.status import planner_status
 from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import SeriesMessage, to_time
@@ -25,7 +25,6 @@ from crgame_ros.ros.run_time import RunTime, TimeCourse, USUAL_NS
 from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
 from crgame_ros.ros.spinning import spin
 from crgame_ros.ros.trusted_code import TrustedCode
-from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 from rcl_interfaces.msg import ParameterDescriptor
@@ -187,23 +186,11 @@ class PlannerNode(Node):
         self._plans.publish(self._message.fill(series))
         if not self._frames_skipped and self._paths.get_subscription_count():
             self._paths.publish(_path(plan, self._transform))
-        self._report(request.k, plan)
+        status = planner_status(self._vehicle_id, request.k, plan, self._manager)
+        if status is not None:
+            self._diagnostics.publish_status(status)
         if self._manager.statistics.plans % COLLECT_EVERY == 0:
             gc.collect()
-
-    def _report(self, k: int, plan: Plan) -> None:
-        """Publish a fallback at once, and the counts every ten requests."""
-        assert self._manager is not None
-        statistics = self._manager.statistics
-        if not plan.fallback and statistics.plans % 10:
-            return
-        self._diagnostics.publish(
-            f'planner_node: {self._vehicle_id}',
-            DiagnosticStatus.WARN if plan.fallback else DiagnosticStatus.OK,
-            f'{BRAKING}{self._manager.last_reason}' if plan.fallback else 'planning',
-            {'k': k, 'plans': statistics.plans, 'fallbacks': statistics.fallbacks,
-             'plan_time_ms': f'{statistics.durations_s[-1] * 1e3:.3f}',
-             'planner': self._manager.name})
 
 
 def _path(plan: Plan, transform: RigidTransform) -> Path:

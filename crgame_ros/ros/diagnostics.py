@@ -4,16 +4,11 @@
 
 from collections.abc import Mapping
 
-from crgame_ros.messages.status_values import status_text
+from crgame_ros.messages.status_values import Status
 from crgame_ros.ros.messages import to_time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-
-
-def printable(text: str) -> str:
-    """Return a text fit for a message, without lone surrogates, which cannot be encoded."""
-    return text.encode('utf-8', 'replace').decode('utf-8')
 
 
 class Diagnostics:
@@ -42,13 +37,16 @@ class Diagnostics:
         :param stamp_ns: simulation time of the status; the latest that the node has received where
             None [ns]
         """
+        return self.array_of(Status.of(name, level[0], text, values), stamp_ns)
+
+    def array_of(self, status: Status, stamp_ns: int | None = None) -> DiagnosticArray:
+        """Build a message of one status, as `array` does."""
         if stamp_ns is not None:
             self.now_ns = stamp_ns
-        status = DiagnosticStatus(level=level, name=printable(name), message=printable(text),
-                                  hardware_id=self._hardware_id)
-        status.values = [KeyValue(key=printable(key), value=printable(status_text(value)))
-                         for key, value in values.items()]
-        message = DiagnosticArray(status=[status])
+        message = DiagnosticArray(status=[DiagnosticStatus(
+            level=bytes([status.level]), name=status.name, message=status.text,
+            hardware_id=self._hardware_id,
+            values=[KeyValue(key=key, value=value) for key, value in status.values.items()])])
         message.header.stamp = to_time(self.now_ns)
         return message
 
@@ -56,3 +54,7 @@ class Diagnostics:
                 stamp_ns: int | None = None) -> None:
         """Publish one status on `/diagnostics`; parameters as of `array`."""
         self.publisher.publish(self.array(name, level, text, values, stamp_ns))
+
+    def publish_status(self, status: Status, stamp_ns: int | None = None) -> None:
+        """Publish one status on `/diagnostics`, as `publish` does."""
+        self.publisher.publish(self.array_of(status, stamp_ns))

@@ -165,6 +165,11 @@ class PlanRequests:
             series, {**{self._ids[index]: lights[index] for index in order[1:]}, **object_lights})
 
 
+def request_topic(av: AvSetup) -> str:
+    """Return the topic of the engine's requests: an AV with perception makes its own of them."""
+    return '/<av>/true_request' if av.spec.perception else '/<av>/plan_request'
+
+
 def _is_told_lights(setup: Setup, av: AvSetup) -> bool:
     """Return whether an AV's planner, or one that an event swaps in, needs others' lights."""
     if av.spec.lights is not None:

@@ -19,6 +19,8 @@ TIMING_COLUMNS = (
 LATE_COLUMNS = (*(f'late_{cause}_s' for cause in Causes._fields), 'late_in')
 # Earlier versions had the first four, then no `put_back`.
 COMMAND_COLUMNS = ('throttle', 'brake', 'steering', 'reverse', 'lights', 'put_back')
+# Label of the first dimension of the message.
+CYCLES = 'cycles'
 # No number of timing is larger, in seconds, steps or counts.
 LARGEST = 1e12
 # Their first columns in a row.
@@ -46,6 +48,11 @@ class CycleRows:
         self._rows = np.frombuffer(self._data).reshape(capacity, len(self.columns))
         self.capacity = capacity
         self.count = 0
+
+    @property
+    def label(self) -> str:
+        """Return the label of the message's second dimension: the columns' names."""
+        return ','.join(self.columns)
 
     @property
     def full(self) -> bool:

@@ -6,11 +6,13 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 
+from crgame_ros.messages.status_values import Status, WARN
 from crgame_ros.nodes.sim.inputs import SimInputs
 from crgame_ros.nodes.sim.outputs import SimOutputs
 from crgame_ros.ros.seat import Seat
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.engine import Simulation
+from crgame_ros.simulation.plan_status import plans_status, refusal_status
 from diagnostic_msgs.msg import DiagnosticStatus
 
 # Refusals published as they happen, between two reports: a flood must not cost the cycle.
@@ -30,11 +32,12 @@ class LiveDiagnostics:
 
     def refusal(self, av_id: str, reason: str) -> None:
         """Publish why a plan was refused."""
-        self._refused(f'{av_id} plan refused', reason, {})
+        self._refused(refusal_status(av_id, reason, self._simulation.n))
 
-    def run_state(self, state: str, more: Mapping[str, object]) -> None:
-        """Publish whether the run is waiting, running, paused or ended."""
-        simulation = self._simulation
+    def run_state(self, values: Mapping[str, object]) -> None:
+        """Publish whether the run is waiting, running, paused or ended (`state_values`)."""
+        simulation, more = self._simulation, dict(values)
+        state = str(more.pop('state'))
         self._outputs.publish_diagnostics(
             'run', DiagnosticStatus.OK, state,
             {'n': simulation.n, 'k': simulation.scheduler.k(simulation.n), **more},
@@ -48,19 +51,22 @@ class LiveDiagnostics:
 
     def event_refused(self, name: str, reason: str) -> None:
         """Publish why a trigger had no effect."""
-        self._refused('event refused', reason, {'event': name[:40]})
+        self._refused(Status.of('sim_node: event refused', WARN, reason,
+                                {'event': name[:40], 'n': self._simulation.n}))
 
     def order_refused(self, reason: str) -> None:
         """Publish why an order about a seat was refused."""
-        self._refused('seat order refused', reason, {})
+        self._refused(Status.of('sim_node: seat order refused', WARN, reason,
+                                {'n': self._simulation.n}))
 
-    def _refused(self, subject: str, reason: str, values: Mapping[str, object]) -> None:
+    def _refused(self, status: Status) -> None:
         self._refusals += 1
         if self._refusals <= MAX_REFUSALS_PER_REPORT:
-            simulation = self._simulation
-            self._outputs.publish_diagnostics(
-                subject, DiagnosticStatus.WARN, reason, {**values, 'n': simulation.n},
-                simulation.scheduler.stamp_ns(simulation.n))
+            self._outputs.publish_status(status, self._stamp_ns)
+
+    @property
+    def _stamp_ns(self) -> int:
+        return self._simulation.scheduler.stamp_ns(self._simulation.n)
 
     def publish(self) -> None:
         """Report on every AV and seat."""
@@ -83,22 +89,8 @@ class LiveDiagnostics:
         return True
 
     def _publish_plans(self, av: AutonomousVehicle) -> None:
-        n, scheduler = self._simulation.n, self._simulation.scheduler
-        counters, age, dt_s = av.counters, av.plan_age_steps(n), scheduler.dt_s
-        stale = av.uses_no_plan
-        self._outputs.publish_diagnostics(
-            f'{av.setup.id} plans',
-            DiagnosticStatus.ERROR if stale else DiagnosticStatus.OK,
-            'no plan: braking' if stale else 'following its plan',
-            {'planner': av.setup.spec.planner, 'running': av.planner_running,
-             'requests': counters.requests, 'accepted': counters.accepted,
-             'refused': counters.refused, 'of_others': counters.of_others,
-             'skipped': counters.skipped,
-             'timed_out': counters.timed_out, 'realigned': counters.realigned,
-             'steps_without_plan': counters.steps_without_plan,
-             'latency_ms': round(counters.last_latency_steps * dt_s * 1e3, 3),
-             'age_ms': '' if age is None else round(age * dt_s * 1e3, 3),
-             'last_refusal': counters.last_refusal, **_tracking(av)}, scheduler.stamp_ns(n))
+        self._outputs.publish_status(plans_status(
+            av, self._simulation.n, self._simulation.scheduler.dt_s), self._stamp_ns)
 
     def _publish_seat(self, seat: Seat) -> None:
         self._outputs.publish_diagnostics(
@@ -107,20 +99,3 @@ class LiveDiagnostics:
             {'source': seat.source, 'losses': seat.losses, 'malformed': seat.malformed,
              'outdated': seat.outdated, 'passed_over': seat.passed_over},
             self._simulation.scheduler.stamp_ns(self._simulation.n))
-
-
-def _tracking(av: AutonomousVehicle) -> dict[str, object]:
-    """Return the present and largest deviations of a tracked AV from its route's lane and plan."""
-    execution = av.execution
-    if execution is None:
-        return {}
-    values: dict[str, object] = {}
-    lane = av.route_lane
-    if lane is not None:
-        values['lane_error'] = '' if lane.error is None else round(lane.error, 4)
-        values['worst_lane_error'] = round(lane.worst, 4)
-    for when, errors in (('', execution.errors), ('worst_', execution.worst)):
-        for name in ('lateral', 'along', 'heading', 'speed'):
-            value = '' if errors is None else round(getattr(errors, name), 4)
-            values[f'{when}{name}_error'] = value
-    return values

@@ -26,10 +26,10 @@ from crgame_ros.ros.seats import SeatSpells
 from crgame_ros.ros.spinning import serve
 from crgame_ros.simulation.autonomous_vehicle import BUSY_TIMEOUT_S
 from crgame_ros.simulation.engine import Simulation, StepResult
+from crgame_ros.simulation.plan_status import stop_reason, stop_status
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.late_step import Phase
 from crgame_ros.timing.time_controller import TimeController
-from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
@@ -269,13 +269,12 @@ class LiveRun:
             return
         vehicle_id, violation_n = stop
         n = self.simulation.n
-        self._outputs.publish_diagnostics(
-            'stop', DiagnosticStatus.ERROR, f'{vehicle_id} violates drivability',
-            {'violation_n': violation_n, 'stop_n': n}, self.simulation.scheduler.stamp_ns(n))
+        self._outputs.publish_status(stop_status(vehicle_id, violation_n, n),
+                                     self.simulation.scheduler.stamp_ns(n))
         self._node.get_logger().warning(
             f'{vehicle_id} violates drivability (n = {violation_n}): stopping at n = {n}')
         self._control.stop_wanted = True
-        self._reason = f'drivability of {vehicle_id}'
+        self._reason = stop_reason(vehicle_id)
 
     def _answers(self, av_id: str, stamp_ns: int) -> bool:
         """

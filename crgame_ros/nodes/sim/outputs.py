@@ -3,11 +3,10 @@
 """The messages of sim_node: built once for a game, refilled at every step."""
 
 from collections.abc import Mapping, Sequence
-import json
 import math
 import time
 
-from crgame_ros.game.documents import EVENTS, FiredEvents, GAME, OBJECTS, RUN_STATE
+from crgame_ros.game.documents import EVENTS, FiredEvents, RUN_STATE
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.game.task_documents import TASK_LOG, TASK_STATE, TaskLog, TaskState
@@ -19,15 +18,15 @@ from crgame_ros.messages.joints import (
     vehicle_joint_names,
     vehicle_to_joints,
 )
-from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.messages.status_values import Status
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import EXACT_VARIANCE, SeriesMessage, set_time, StateMessage
 from crgame_ros.simulation.engine import Simulation, StepResult
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.plan_requests import request_topic
+from crgame_ros.simulation.run_texts import document_texts, SignalTexts, state_text
 from crgame_ros.simulation.setup import Setup
-from crgame_ros.timing.cycle_rows import CycleRows
+from crgame_ros.timing.cycle_rows import CycleRows, CYCLES
 from crgame_ros.timing.publishing import steps_between_messages
-from crgame_ros.vehicle.lights import signals_document
 from crgame_ros.vehicle.state import VehicleState
 from geometry_msgs.msg import AccelStamped
 from nav_msgs.msg import Odometry
@@ -113,19 +112,14 @@ class SimOutputs:
         self._task_log = endpoints.publisher(TASK_LOG.topic)
         self._diagnostics = endpoints.diagnostics
         # With perception, its node builds the plan request from the true one.
-        self._request_topics = {
-            av.id: '/<av>/true_request' if av.spec.perception else '/<av>/plan_request'
-            for av in setup.avs}
+        self._request_topics = {av.id: request_topic(av) for av in setup.avs}
         self._requests = {av: endpoints.publisher(topic, av)
                           for av, topic in self._request_topics.items()}
         self._request_messages: dict[str, SeriesMessage] = {}
         self._vehicles = [VehicleOutputs(endpoints, vehicle) for vehicle in setup.vehicle_ids]
         self.frames_skipped = False
         self._simulation, self._epoch = '', 0
-        self._lights = TrafficLights(setup.loaded.scenario)
-        self._light_states: dict[int, str] | None = None
-        self._object_lights: dict[str, int] = {}
-        self._vehicle_lights: list[int] | None = None
+        self._signals = SignalTexts(setup)
         self._build_messages()
 
     def _build_messages(self) -> None:
@@ -141,8 +135,8 @@ class SimOutputs:
         width = len(self.rows.columns)
         self._cycle_message = Float64MultiArray()
         self._cycle_message.layout.dim = [
-            MultiArrayDimension(label='cycles'),
-            MultiArrayDimension(label=','.join(self.rows.columns), size=width, stride=width)]
+            MultiArrayDimension(label=CYCLES),
+            MultiArrayDimension(label=self.rows.label, size=width, stride=width)]
 
     def publish_documents(self, epoch: int, clock_offset_ns: int, factor: float,
                           simulation: str) -> None:
@@ -151,23 +145,16 @@ class SimOutputs:
 
         :param simulation: name of this process.
         """
-        setup = self._setup
         self._simulation, self._epoch = simulation, epoch
-        self._vehicle_lights = None
-        texts = {'/scenario/xml': setup.loaded.xml_text,
-                 OBJECTS.topic: OBJECTS.write(setup.descriptions),
-                 EVENTS.topic: EVENTS.write(FiredEvents(epoch, ())),
-                 TASK_STATE.topic: TASK_STATE.write(TaskState(epoch, (), ())),
-                 GAME.topic: GAME.write(describe_game(
-                     setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
-                     real_time_factor=factor, simulation=simulation))}
-        for name, text in texts.items():
+        for name, text in document_texts(
+                self._setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
+                real_time_factor=factor, simulation=simulation).items():
             self._latched[name].publish(String(data=text))
 
     def publish_state(self, values: Mapping[str, object]) -> None:
         """Publish whether the run waits, goes on, stands still or is over."""
-        self._latched[RUN_STATE.topic].publish(String(data=json.dumps(
-            {'simulation': self._simulation, 'epoch': self._epoch, **values})))
+        self._latched[RUN_STATE.topic].publish(String(
+            data=state_text(values, self._epoch, self._simulation)))
 
     def publish_seats(self, seats: str, drivers: str) -> None:
         """Publish the present drivers of the seats, and all drivers so far."""
@@ -214,10 +201,12 @@ class SimOutputs:
             return
         stamp_ns = simulation.scheduler.stamp_ns(result.n)
         self.publish_clock(stamp_ns)
-        self._publish_lights(simulation)
+        self._publish_changed('/vehicles/signals',
+                              self._signals.of_vehicles(simulation.n, simulation.lights))
         if result.objects is not None:
             self._publish_objects(result.objects, stamp_ns)
-            self._publish_signals(result.k, simulation.object_lights)
+            self._publish_changed('/scenario/signals', self._signals.of_scenario(
+                result.k, simulation.object_lights))
             for vehicle in self._vehicles:
                 vehicle.count_subscribers()
         self._publish_states(simulation.states, stamp_ns, result.objects is not None)
@@ -265,19 +254,9 @@ class SimOutputs:
         if tick:
             self._tick_state.publish(message.message)
 
-    def _publish_signals(self, k: int, objects: dict[str, int]) -> None:
-        states = self._lights.states_at(k)
-        if states is not self._light_states or objects != self._object_lights:
-            self._light_states, self._object_lights = states, objects
-            self._latched['/scenario/signals'].publish(
-                String(data=json.dumps({'k': k, 'states': states, 'objects': objects})))
-
-    def _publish_lights(self, simulation: Simulation) -> None:
-        lights = simulation.lights
-        if lights != self._vehicle_lights:
-            self._vehicle_lights = lights
-            self._latched['/vehicles/signals'].publish(String(data=signals_document(
-                simulation.n, dict(zip(self._setup.vehicle_ids, lights, strict=True)))))
+    def _publish_changed(self, topic: str, text: str | None) -> None:
+        if text is not None:
+            self._latched[topic].publish(String(data=text))
 
     def publish_rows(self) -> None:
         """Publish the cycles collected so far."""
@@ -291,6 +270,10 @@ class SimOutputs:
                             values: dict[str, object], stamp_ns: int) -> None:
         """Publish one status."""
         self._diagnostics.publish(f'sim_node: {name}', level, text, values, stamp_ns)
+
+    def publish_status(self, status: Status, stamp_ns: int) -> None:
+        """Publish one status as it is."""
+        self._diagnostics.publish_status(status, stamp_ns)
 
     def missing(self, companions: Sequence[str]) -> set[str]:
         """

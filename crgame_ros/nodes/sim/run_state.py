@@ -9,6 +9,7 @@ from crgame_ros.nodes.sim.control import SimControl
 from crgame_ros.nodes.sim.live_diagnostics import LiveDiagnostics
 from crgame_ros.nodes.sim.outputs import SimOutputs
 from crgame_ros.simulation.engine import Simulation
+from crgame_ros.simulation.run_texts import state_values
 
 # The whole program was asked to end.
 SIGNAL = 'signal'
@@ -64,12 +65,13 @@ class RunState:
         news = (state, reason, control.awaited, control.countdown_s)
         if news == self._told and now_ns - self._told_ns <= NS_PER_S:
             return
-        values = {'real_time_factor': control.real_time_factor, 'reason': reason,
-                  'stays': control.stays and reason != SIGNAL,
-                  'awaited': ','.join(control.awaited), 'countdown_s': control.countdown_s}
-        self._diagnostics.run_state(state, values)
+        values = state_values(
+            state, reason, real_time_factor=control.real_time_factor,
+            stays=control.stays and reason != SIGNAL, awaited=control.awaited,
+            countdown_s=control.countdown_s)
+        self._diagnostics.run_state(values)
         if news != self._told:
-            self._outputs.publish_state({'state': state, **values})
+            self._outputs.publish_state(values)
         self._told, self._told_ns = news, now_ns
 
     def stand(self) -> None:
