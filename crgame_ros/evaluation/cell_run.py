@@ -32,18 +32,20 @@ import numpy as np
 _CODE_FAILED = re.compile(r'(setup failed: )?(\w*(Error|Exception|Interrupt|Iteration))\b')
 
 
-def run_cell(cell: Cell, contents: Path) -> OfflineResult:
+def run_cell(cell: Cell, contents: Path, keep_messages: bool = False) -> OfflineResult:
     """
     Run a cell offline.
 
     :param contents: folder of the store with its contents.
+    :param keep_messages: whether it is to be recorded.
     :raises InputError: if a part of it cannot be used.
     """
     setup = cell_setup(cell, contents)
     inputs = _inputs(cell, contents)
     return run_offline(setup, duration_s=cell.condition.duration_s,
                        latency_steps=cell.condition.latency_steps, drivers=inputs.drivers,
-                       intervals_s=inputs.intervals_s, clock_s=time.perf_counter)
+                       intervals_s=inputs.intervals_s, clock_s=time.perf_counter,
+                       keep_messages=keep_messages)
 
 
 def cell_setup(cell: Cell, contents: Path) -> Setup:

@@ -17,7 +17,7 @@ from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.evaluation.summary.command import add_summary_arguments
 from crgame_ros.game.variation_spec import Sampling
 from crgame_ros.library.lookup import names_file
-from crgame_ros.paths import find_game
+from crgame_ros.paths import find_game, make_folder
 from crgame_ros.schema.marks import named_file
 
 if TYPE_CHECKING:  # Other commands do not wait for it.
@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # Other commands do not wait for it.
 
 def report_cell(folder: Path, key: str, say: Callable[[str], object]) -> Path:
     """
-    Run a cell again, and write its report and its scenario.
+    Run a cell again, and write its report, its recording and its scenario.
 
     :param folder: folder of the evaluation.
     :param key: key of the cell, or its first digits.
@@ -39,17 +39,22 @@ def report_cell(folder: Path, key: str, say: Callable[[str], object]) -> Path:
     from crgame_ros.analysis.runs.run import Run
     from crgame_ros.evaluation.cell_run import run_cell
     from crgame_ros.recording.export import prepare_folder, write_scenario
+    from crgame_ros.recording.offline_recording import write_recording
     place = EvaluationFolder(folder)
     cell = place.find(key)
     if cell.condition.code[0] != engine_digest():
         say('note: another version of crgame_ros planned this cell; its run may differ')
     say(f'running {cell.label}')
-    result = run_cell(cell, place.store.folder)
+    result = run_cell(cell, place.store.folder, keep_messages=True)
     run = Run(cell.label, result=result)
     path = folder / REPORTS / f'{cell.key}.html'
     prepare_folder(path.parent)
     write_report([run], path)
     write_scenario(run.log, path.with_suffix('.xml'))
+    recording = path.with_suffix('')
+    make_folder(recording, 'choose another folder')
+    write_recording(result, recording, replace=True)
+    say(f'see it again: crgame run --replay {recording}')
     return path
 
 

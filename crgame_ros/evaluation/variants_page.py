@@ -48,14 +48,16 @@ class Finding:
     :param told: what it changes, in words.
     :param values: of the goals.
     :param report: address of its report, relative to the page.
-    :param command: with which a person drives in it.
+    :param drive: command with which a person drives in it.
+    :param replay: command that shows its recording.
     """
 
     name: str
     told: str
     values: Sequence[float | None]
     report: str
-    command: str
+    drive: str
+    replay: str
 
 
 @dataclass(frozen=True)
@@ -123,10 +125,12 @@ def write_variants_page(view: VariantsView, folder: Path, name: str) -> Path:
 
 def _findings(view: VariantsView) -> str:
     rows = [(f'<a href="{plain(each.report)}">{plain(each.name)}</a>', plain(each.told),
-             *(number(value) for value in each.values), f'<code>{plain(each.command)}</code>')
+             *(number(value) for value in each.values),
+             f'<code>{plain(each.replay)}</code><br><code>{plain(each.drive)}</code>')
             for each in view.findings]
-    return table('Failures to look at', ('report', 'changed in the game', *map(plain, view.goals),
-                                         'drive in it yourself'), rows) if rows else ''
+    head = ('report', 'changed in the game', *map(plain, view.goals),
+            'see it again, and drive in it yourself')
+    return table('Failures to look at', head, rows) if rows else ''
 
 
 def axis_values(axis: Axis) -> dict[str, object]:

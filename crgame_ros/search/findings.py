@@ -13,6 +13,7 @@ from crgame_ros.evaluation.cell_run import cell_setup
 from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.paths import make_folder
 from crgame_ros.recording.export import write_scenario
+from crgame_ros.recording.offline_recording import GAME_FILE, write_recording
 from crgame_ros.search.live_game import for_a_person
 from crgame_ros.search.search import SearchResult
 from crgame_ros.search.trials import Outcome
@@ -21,7 +22,7 @@ from crgame_ros.variation.space import VariantSpace
 from crgame_ros.whole_file import write_text
 
 FOUND = 'found'
-REPORT, GAME, LIVE = 'report.html', 'game.yaml', 'live.yaml'
+REPORT, LIVE = 'report.html', 'live.yaml'
 # Two findings are no closer than this, in ranges or standard deviations.
 _APART = 0.1
 
@@ -53,7 +54,8 @@ def write_findings(result: SearchResult, folder: Path, number: int) -> list[tupl
     """
     Run the failures to show again, and write a folder for each.
 
-    It has the report, the CommonRoad scenario, the game, and the game for a person to drive.
+    It has the report, the recording, the CommonRoad scenario, the game, and the game for a person
+    to drive.
 
     :param folder: of the search.
     :param number: of the worst ones.
@@ -72,10 +74,12 @@ def write_findings(result: SearchResult, folder: Path, number: int) -> list[tupl
         values = ', '.join(f'{key} {value}' for key, value in outcome.variant.items())
         game = replace(setup.game, title=f'{setup.game.title} ({values})'.strip(),
                        expect=result.expectations)
-        run = Run(f'{Path(result.settings.game).stem}: {values}', result=run_offline(setup))
+        offline = run_offline(setup, keep_messages=True)
+        run = Run(f'{Path(result.settings.game).stem}: {values}', result=offline)
         write_report([run], out / REPORT)
         write_scenario(run.log, out)
-        write_text(game.dump(), out / GAME)
+        write_recording(offline, out)
+        write_text(game.dump(), out / GAME_FILE)
         write_text(for_a_person(game).dump(), out / LIVE)
         found.append((outcome, out))
     return found

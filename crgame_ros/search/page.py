@@ -12,7 +12,8 @@ from crgame_ros.evaluation.variants_page import (
     VariantsView,
     write_variants_page,
 )
-from crgame_ros.search.findings import GAME, LIVE, REPORT
+from crgame_ros.recording.offline_recording import GAME_FILE
+from crgame_ros.search.findings import LIVE, REPORT
 from crgame_ros.search.search import SearchResult
 from crgame_ros.search.text import boundary_slices, changes, lines, told, verdict
 from crgame_ros.search.trials import Outcome
@@ -31,7 +32,7 @@ def write_search_page(result: SearchResult, found: Sequence[tuple[Outcome, Path]
     """
     links = {outcome.key: {
         'report': (place / REPORT).relative_to(folder).as_posix(),
-        'game': (place / GAME).relative_to(folder).as_posix()} for outcome, place in found}
+        'game': (place / GAME_FILE).relative_to(folder).as_posix()} for outcome, place in found}
     view = VariantsView(
         f'{Path(result.settings.game).stem}: where '
         f'{result.settings.planner.rpartition("/")[2] or "its planner"} fails',
@@ -42,6 +43,7 @@ def write_search_page(result: SearchResult, found: Sequence[tuple[Outcome, Path]
                       told(outcome)) for outcome in result.outcomes],
         list(boundary_slices(result)), links,
         [Finding(place.name, changes(result.space, outcome.variant), outcome.values,
-                 links[outcome.key]['report'], f'./run.sh {place / LIVE}')
+                 links[outcome.key]['report'], f'./run.sh {place / LIVE}',
+                 f'./run.sh --replay {place}')
          for outcome, place in found])
     return write_variants_page(view, folder, PAGE)

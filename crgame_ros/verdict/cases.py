@@ -32,6 +32,7 @@ class Case:
     :param game: its file.
     :param seed: of everything random.
     :param planner: of all AVs; None for those of the game.
+    :param copy: name of a copy of the game that is run instead, with its file; None for none.
     :param options: of this planner.
     """
 
@@ -39,11 +40,17 @@ class Case:
     seed: int
     planner: str | None = None
     options: Mapping[str, object] = field(default_factory=dict)
+    copy: tuple[str, Path] | None = None
 
     @property
     def name(self) -> str:
         """Return its name for people."""
-        return f'{self.game.stem}[{self.seed}]'
+        return f'{self.game.stem}[{self.seed}]' + (f' {self.copy[0]}' if self.copy else '')
+
+    @property
+    def file(self) -> Path:
+        """Return the file that is run."""
+        return self.game if self.copy is None else self.copy[1]
 
 
 @dataclass(frozen=True)
@@ -119,9 +126,9 @@ def run_case(case: Case, out: Path) -> CaseResult:
     began = time.perf_counter()
     expectations: tuple[Expectation, ...] = ()
     try:
-        game = load_game(case.game)
+        game = load_game(case.file)
         expectations = game.expect
-        check_expectations(game, str(case.game))
+        check_expectations(game, str(case.file))
         game = _adapted(game, case)
         result = run_offline(build_setup(game), keep_messages=True)
         run = Run(case.name, result=result, scoring='drives')
@@ -129,7 +136,8 @@ def run_case(case: Case, out: Path) -> CaseResult:
         broken = tuple(tuple(shortfalls(each, rows)) for each in expectations)
         folder = None
         if any(broken):
-            folder = out / f'{case.game.stem}-{case.seed}'
+            folder = out / '-'.join((
+                case.game.stem, str(case.seed), *(case.copy[:1] if case.copy else ())))
             folder.mkdir(parents=True, exist_ok=True)
             write_report([run], folder / REPORT)
             write_recording(result, folder, replace=True)

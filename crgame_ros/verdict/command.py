@@ -3,6 +3,8 @@
 """The command `crgame test`: games as tests of a planner."""
 
 import argparse
+from dataclasses import replace
+from itertools import groupby
 import json
 import os
 from pathlib import Path
@@ -23,6 +25,7 @@ Run games that say what they expect, and judge them: exit code 0 if every expect
   crgame test cut_in.yaml --planner my.py:Mine    with your planner for all AVs
   crgame test scenarios --seeds 20                expectations over 20 seeds, with an interval
   crgame test scenarios -k merge --rerun-failed   those named so that failed the last time
+  crgame test scenarios --copies                  mirrored, turned, moved, renumbered as well
 
 docs/testing.md tells of expectations and of CI."""
 LAST = 'last.json'
@@ -42,6 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add('--planner', metavar='NAME', help='planner of all AVs')
     add('--option', action='append', default=[], metavar='KEY=VALUE',
         help='an option of this planner; may be repeated')
+    add('--copies', action='store_true', help='also run copies of the games, mirrored, turned, '
+        'moved and renumbered: they have to keep and break the same')
     add('--workers', type=int, metavar='N', help='processes (default: one for each processor)')
     add('--rerun-failed', action='store_true', help='only what failed the last time')
     add('--junit', type=Path, metavar='FILE.xml', help='write the verdicts as JUnit XML')
@@ -67,6 +72,8 @@ def run(values: argparse.Namespace) -> int:
         print('nothing failed the last time')
         return 0
     make_folder(values.out, 'choose another place with --out')
+    if values.copies:
+        cases = _with_copies(cases, values.out / 'copies')
     began = time.perf_counter()
     workers = values.workers or len(os.sched_getaffinity(0))
     results = run_cases(cases, values.out, max(1, workers), _tell)
@@ -76,15 +83,18 @@ def run(values: argparse.Namespace) -> int:
             print(f'FAILED {verdict.game}: {verdict.told}: {verdict.share()}')
             for line in broken_lines(verdict)[:_TOLD]:
                 print(f'       {line}')
+    told = {result.case.name for verdict in verdicts for result, _ in verdict.broken}
     for result in results:
-        if result.folder is not None:
+        # A copy that breaks what its original breaks tells nothing new.
+        if result.folder is not None and result.case.name in told:
             print(f'       {result.case.name}: {result.folder / REPORT}')
             print(f'       {" " * len(result.case.name)}  {replay_command(result.folder)}')
     if values.junit is not None:
         write_bytes(junit_xml(verdicts, 'crgame test'), values.junit)
     page = write_page(verdicts, results, values.out)
-    write_text(json.dumps([[str(result.case.game.resolve()), result.case.seed]
-                           for result in results if not result.is_good]), values.out / LAST)
+    failed = {(str(result.case.game.resolve()), result.case.seed)
+              for result in results if not result.is_good}
+    write_text(json.dumps(sorted(failed)), values.out / LAST)
     bad = sum(not verdict.is_kept for verdict in verdicts)
     games = len({case.game for case in cases})
     print(f'{games} game{"s" * (games > 1)}, {len(cases)} run{"s" * (len(cases) > 1)}: '
@@ -117,6 +127,23 @@ def _cases(values: argparse.Namespace) -> 'list[Case]':
     elif not cases:
         raise InputError('is in the name of no game', '-k', 'give another word')
     return cases
+
+
+def _with_copies(cases: 'list[Case]', folder: Path) -> 'list[Case]':
+    """Return cases with those of copies after the ones of each game; write the copies' files."""
+    from crgame_ros.verdict.copies import COPIES, write_copy
+    found: list[Case] = []
+    for game, group in groupby(cases, lambda case: case.game):
+        own = list(group)
+        found += own
+        for place in COPIES:
+            try:
+                file = write_copy(game, place, folder / f'{game.stem}-{place.name}')
+            except InputError as error:
+                print(f'note: no {place.name} copy: {error}', file=sys.stderr)
+                continue
+            found += [replace(case, copy=(place.name, file)) for case in own]
+    return found
 
 
 def _last(path: Path) -> set[tuple[str, int]]:

@@ -68,7 +68,7 @@ class Placement(NamedTuple):
     def name(self) -> str:
         """Return a name for people."""
         return 'mirrored' if self.mirrored else 'renumbered' if self.added else \
-            'UTM' if any(self.offset) else f'{self.degrees:g}°'
+            'moved' if any(self.offset) else f'turned-{self.degrees:g}'
 
     def point(self, x: float, y: float) -> list[float]:
         """Return where a point of the map comes to lie."""
@@ -93,7 +93,7 @@ def write_copy(game: Path, place: Placement, folder: Path) -> Path:
     :return: the copy's file.
     :raises InputError: if the game has something that cannot be placed anew.
     """
-    given = load_game(game)
+    given, folder = load_game(game), folder.resolve()
     values = placed(_values(given, place, str(game)), place)
     values['scenario'] = write_scenario_copy(given.scenario, place, folder)
     if place.mirrored:
@@ -182,6 +182,8 @@ def write_scenario_copy(source: Path, place: Placement, folder: Path) -> str:
 
 def write_exactly(scenario: Scenario, problems: PlanningProblemSet, path: Path) -> str:
     """Write a scenario with all digits of its coordinates; return the path as text."""
+    # It tells of each file that it replaces.
+    path.unlink(missing_ok=True)
     CommonRoadFileWriter(scenario, problems, decimal_precision=DIGITS).write_to_file(
         str(path), OverwriteExistingFile.ALWAYS)
     return str(path)

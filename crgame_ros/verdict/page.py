@@ -46,7 +46,8 @@ def _row(verdict: Verdict, out: Path) -> str:
     kind = 'good' if verdict.is_kept else 'bad'
     runs = []
     for result, lines in verdict.broken:
-        name = escape(f'seed {result.case.seed}')
+        copy = f', {result.case.copy[0]}' if result.case.copy else ''
+        name = escape(f'seed {result.case.seed}{copy}')
         if result.folder is not None:
             link = (result.folder / REPORT).relative_to(out).as_posix()
             name = f'<a href="{escape(link)}">{name}</a>'

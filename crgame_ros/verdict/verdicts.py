@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The verdict on each expectation of a game, over all its runs."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -58,7 +58,8 @@ class Verdict:
 def verdicts_of(results: Sequence[CaseResult]) -> Iterator[Verdict]:
     """Yield the verdicts of each game, in order: first on whether it runs, if it does not."""
     for game, group in groupby(results, lambda result: result.case.game):
-        runs = list(group)
+        every = list(group)
+        runs = [result for result in every if result.case.copy is None]
         wall_s = sum(result.wall_s for result in runs)
         failed = [result for result in runs if result.error]
         if failed:
@@ -70,6 +71,32 @@ def verdicts_of(results: Sequence[CaseResult]) -> Iterator[Verdict]:
                            if result.broken[place])
             yield Verdict(game, expected.told(), len(ran) - len(broken), len(ran),
                           expected.share, broken, wall_s)
+        copies = [result for result in every if result.case.copy is not None]
+        if copies:
+            yield _on_copies(game, {result.case.seed: result for result in runs}, copies)
+
+
+def _on_copies(game: Path, originals: Mapping[int, CaseResult],
+               copies: Sequence[CaseResult]) -> Verdict:
+    """Return the verdict on copies, which have to keep and break what their originals do."""
+    found = [(copy, tuple(_differences(originals[copy.case.seed], copy))) for copy in copies]
+    different = tuple((copy, lines) for copy, lines in found if lines)
+    names = ', '.join(dict.fromkeys(copy.case.copy[0] for copy in copies if copy.case.copy))
+    return Verdict(game, f'copies keep and break the same ({names})',
+                   len(copies) - len(different), len(copies), 1.0, different,
+                   sum(copy.wall_s for copy in copies))
+
+
+def _differences(original: CaseResult, copy: CaseResult) -> Iterator[str]:
+    if original.error or copy.error:
+        if copy.error and not original.error:
+            yield copy.error
+        return
+    for expected, there, here in zip(original.expectations, original.broken, copy.broken,
+                                     strict=True):
+        if bool(there) != bool(here):
+            yield (f'{expected.told()}: kept, but {"; ".join(there)} in the game as it is'
+                   if there else f'{"; ".join(here)}, but kept in the game as it is')
 
 
 def junit_xml(verdicts: Sequence[Verdict], name: str) -> bytes:
@@ -95,7 +122,11 @@ def junit_xml(verdicts: Sequence[Verdict], name: str) -> bytes:
     return bytes(ElementTree.tostring(root, encoding='utf-8', xml_declaration=True))
 
 
+def _of_copy(result: CaseResult) -> str:
+    return f', {result.case.copy[0]}' if result.case.copy else ''
+
+
 def broken_lines(verdict: Verdict) -> list[str]:
     """Return a line for each vehicle and run that broke an expectation."""
-    return [f'seed {result.case.seed}: {line}' for result, lines in verdict.broken
-            for line in lines]
+    return [f'seed {result.case.seed}{_of_copy(result)}: {line}'
+            for result, lines in verdict.broken for line in lines]

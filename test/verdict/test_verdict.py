@@ -15,7 +15,9 @@ from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.file import parse_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.export_network import schema_errors
+from crgame_ros.schema.writing import write
 from crgame_ros.verdict.cases import Case, CaseResult
+from crgame_ros.verdict.copies import placed, Placement
 from crgame_ros.verdict.verdicts import verdicts_of
 from lxml import etree
 import pytest
@@ -147,3 +149,52 @@ def test_an_expectation_that_means_nothing_is_refused(expected: dict[str, object
     with pytest.raises(InputError) as caught:
         check_expectations(parse_game(values, 'g.yaml', Path('.')), 'g.yaml')
     assert what in str(caught.value)
+
+
+SOUTHERN = """
+from crgame_ros.planner.idm import IdmPlanner
+
+
+class Southern(IdmPlanner):
+    name = 'southern'
+
+    def plan(self, request):
+        if request.ego.x > 5000.0:
+            raise RuntimeError('this is not my town')
+        return super().plan(request)
+"""
+
+
+def test_copies_find_a_planner_that_knows_one_place(tmp_path: Path) -> None:
+    (tmp_path / 'southern.py').write_text(SOUTHERN)
+    words = ('cut_in', '--copies', '--out', 'copied')
+    code, out, told = run(tmp_path, *words)
+    assert code == 0, out + told
+    assert out.startswith('1 game, 5 runs: 5 passed, 0 failed in ')
+    code, out, told = run(tmp_path, *words, '--planner', 'southern.py:Southern')
+    assert code == 1
+    lines = out.splitlines()
+    assert lines[0].endswith(': copies keep and break the same (mirrored, turned-137, moved, '
+                             'renumbered): 3 of 4 runs, 75 % (30 to 95 %)')
+    assert lines[1].startswith('       seed 0, moved: AVs: accepted')
+    assert [line for line in lines if 'report.html' in line] == [
+        '       cut_in[0] moved: copied/cut_in-0-moved/report.html']
+
+
+def test_copies_keep_the_ids_that_a_game_names(tmp_path: Path) -> None:
+    game = parse_game({
+        'scenario': str(scenarios_directory() / 'ZAM_LaneChange-1_1_T-1.xml'),
+        'events': [{'name': 'a', 'brake': {'object': 30}, 'when': {
+            'between': ['o30', 'hv0'], 'distance': 5.0}},
+            {'name': 'b', 'speed_limit': {'speed': 5, 'lanelets': [3]}},
+            {'name': 'c', 'obstacle': {'x': 1.0, 'y': 2.0}, 'when': {
+                'vehicle': 'hv0', 'x': 3.0, 'y': 4.0, 'radius': 2.0}}]}, 'g', tmp_path)
+    values = write(game)
+    renumbered = parse_game(placed(values, Placement(added=1000)), 'g', tmp_path)
+    assert renumbered.events[0].action.object == 1030  # type: ignore[union-attr]
+    assert renumbered.events[0].when.between == ('o1030', 'hv0')  # type: ignore[union-attr]
+    assert renumbered.events[1].action.lanelets == (1003,)  # type: ignore[union-attr]
+    turned = parse_game(placed(values, Placement(90.0)), 'g', tmp_path).events[2]
+    assert (turned.action.x, turned.action.y, turned.action.yaw) == pytest.approx(  # type: ignore
+        (-2.0, 1.0, math.pi / 2))
+    assert (turned.when.x, turned.when.y) == pytest.approx((-4.0, 3.0))  # type: ignore
