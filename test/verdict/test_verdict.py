@@ -176,7 +176,7 @@ def test_copies_find_a_planner_that_knows_one_place(tmp_path: Path) -> None:
     lines = out.splitlines()
     assert lines[0].endswith(': copies keep and break the same (mirrored, turned-137, moved, '
                              'renumbered): 3 of 4 runs, 75 % (30 to 95 %)')
-    assert lines[1].startswith('       seed 0, moved: AVs: accepted')
+    assert lines[1] == '       seed 0, moved: av0: accepted is 0, but kept in the game as it is'
     assert [line for line in lines if 'report.html' in line] == [
         '       cut_in[0] moved: copied/cut_in-0-moved/report.html']
 
