@@ -82,14 +82,19 @@ def begin(settings: SearchSettings, folder: Path) -> None:
     for goal in settings.goals:
         known_measure(goal.measure, f'--{"minimise" if goal.sign > 0 else "maximise"}')
     space_of(write(game, game.base), str(path)).check(game.base, str(path))
-    if not (folder / GRID_FILE).exists():
-        place = EvaluationFolder(folder)
-        choice = PlannerChoice(settings.planner or OWN, options=dict(settings.options))
-        plan = EvaluationPlan(games=(str(path.resolve()),), planners=(choice,),
-                              seeds=[game.seed])
-        grid = make_grid(plan, place.store)
+    place = EvaluationFolder(folder)
+    choice = PlannerChoice(settings.planner or OWN, options=dict(settings.options))
+    plan = EvaluationPlan(games=(str(path.resolve()),), planners=(choice,), seeds=[game.seed])
+    there = (folder / GRID_FILE).exists()
+    if there:
+        settings.write(folder)
+    grid = make_grid(plan, place.store)
+    if not there:
         place.begin(plan, grid)
-    settings.write(folder)
+        settings.write(folder)
+    elif _without_variants(place.grid()) != grid:
+        raise InputError('its game, its planner or crgame_ros has changed since', str(folder),
+                         'search again in another folder: --out')
 
 
 def run_search(folder: Path, computing: Computing, began: Began, told: Told) -> SearchResult:

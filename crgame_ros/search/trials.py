@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_batches import CellBatches
 from crgame_ros.evaluation.cell_grid import CellGrid
@@ -16,6 +17,7 @@ from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.evaluation.judging import shortfalls, worst_of
 from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.results.parts import ResultParts, stored_rows
+from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.objects import Role
 from crgame_ros.search.settings import SearchSettings
@@ -111,6 +113,7 @@ class Trials:
         :return: their outcomes, in the order of the variants. One that was run before is not run
             again, and costs nothing.
         :raises CrgameError: if the scheduler is lost; what was finished is kept.
+        :raises InputError: if another version of the program began the search.
         """
         texts: list[str] = []
         new: dict[str, Variant] = {}
@@ -132,6 +135,9 @@ class Trials:
         missing = [cell for cell in cells if cell.key not in self._earlier]
         self._grid = replace(self._grid, scenes=(
             replace(scene, variants=(*scene.variants, *new.values())),))
+        if missing and self._grid.engine != engine_digest():
+            raise InputError('another version of crgame_ros began it', str(self._place.path),
+                             'search again in another folder: --out')
         if missing:
             # Before their rows: a cell is found by the variants in the grid.
             self._place.write_grid(self._plan, self._grid)

@@ -147,6 +147,8 @@ def test_a_killed_search_goes_on_and_finds_the_same(tmp_path: Path) -> None:
                         load_game(game_file).objects[0].speeds[0])
     assert 'drive one yourself: ./run.sh ' in out
     assert re.search(r'smallest change that fails: .*→', out)
+    other = search(tmp_path / 'whole', '--seed', '1')
+    assert 'another search is in it' in other.communicate()[1] and other.returncode == 2
 
 
 def test_what_cannot_be_searched_is_refused_in_one_line(tmp_path: Path) -> None:
