@@ -100,8 +100,8 @@ def could_avoid(mine: Course, other: Course, step: int, dt_s: float) -> bool:
     :param step: the first at which they touch.
     :param dt_s: time between the steps [s]
     """
-    stride = max(1, round(_STRIDE_S / dt_s))
-    start = _in_the_way_since(mine, other, step, stride, round(_BEFORE_S / dt_s))
+    stride = _stride(dt_s)
+    start = in_the_way_since(mine, other, step, dt_s)
     if start is None or mine.braking <= 0.0:
         return False
     end = min(len(mine.poses), step + round(_AFTER_S / dt_s) + 1)
@@ -120,9 +120,26 @@ def could_avoid(mine: Course, other: Course, step: int, dt_s: float) -> bool:
     return not any(_touch(again, there, index) for index in range(0, len(poses), stride))
 
 
-def _in_the_way_since(mine: Course, other: Course, step: int, stride: int,
-                      most: int) -> int | None:
-    """Find the first step of the last interval before the contact with the other in the way."""
+def stood_in_the_way(mine: Course, other: Course, step: int, dt_s: float) -> bool:
+    """
+    Return whether the other was in the body's way ever since both were there, or for 10 s.
+
+    Parameters as in `could_avoid`.
+    """
+    since = in_the_way_since(mine, other, step, dt_s)
+    before = -1 if since is None else since - _stride(dt_s)
+    return since is not None and (
+        before < max(step - round(_BEFORE_S / dt_s), 0)
+        or not np.isfinite((mine.poses[before], other.poses[before])).all())
+
+
+def in_the_way_since(mine: Course, other: Course, step: int, dt_s: float) -> int | None:
+    """
+    Find the first step of the last interval before the contact with the other in the way.
+
+    Parameters as in `could_avoid`; None if it never was.
+    """
+    stride, most = _stride(dt_s), round(_BEFORE_S / dt_s)
     since = None
     for index in range(step - stride, max(step - most, 0) - 1, -stride):
         if not np.isfinite((mine.poses[index], other.poses[index])).all() \
@@ -130,6 +147,10 @@ def _in_the_way_since(mine: Course, other: Course, step: int, stride: int,
             break
         since = index
     return since
+
+
+def _stride(dt_s: float) -> int:
+    return max(1, round(_STRIDE_S / dt_s))
 
 
 def _way(mine: Course, first: int, last: int, stride: int) -> shapely.Geometry:

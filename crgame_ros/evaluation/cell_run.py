@@ -24,6 +24,7 @@ from crgame_ros.recording.recorded_inputs import RecordedInputs
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.av_assignment import adapt_game, OWN
+from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, PlannerRecord, run_offline
 from crgame_ros.simulation.setup import build_setup, Setup
 import numpy as np
@@ -108,11 +109,12 @@ def compute_cell(cell: Cell, contents: Path) -> dict[str, object]:
     """
     computed_s = time.process_time()
     result = run_cell(cell, contents)
-    vehicles = vehicle_rows(measured(cell, result), result)
+    contacts = contacts_of(result)
+    vehicles = vehicle_rows(measured(cell, result), result, contacts)
     durations_s = [time_s for record in result.planners.values()
                    for time_s in record.statistics.durations_s]
     return {
-        'cell': outcome_of(result) | _failure(result.planners),
+        'cell': outcome_of(result, contacts) | _failure(result.planners),
         'vehicles': vehicles,
         'work': {
             'computing_s': time.process_time() - computed_s,

@@ -113,12 +113,17 @@ class Motions:
 
 def contacts_of(result: OfflineResult) -> tuple[Contact, ...]:
     """Find the contacts in an offline run, as `find_contacts` does."""
+    return find_contacts(motions_of(result), result.violations, result.fired)
+
+
+def motions_of(result: OfflineResult) -> Motions:
+    """Return the motions of all vehicles and objects of an offline run."""
     setup = result.setup
     ticks = setup.scheduler.steps_per_tick * np.arange(len(result.object_poses))
-    return find_contacts(Motions(
+    return Motions(
         setup.descriptions, {av.id: av.vehicle.max_acceleration for av in setup.avs},
         setup.scheduler, result.vehicle_states, ticks, result.object_poses,
-        result.object_velocities), result.violations, result.fired)
+        result.object_velocities)
 
 
 class _Touch(NamedTuple):

@@ -121,6 +121,7 @@ def run_case(case: Case, out: Path) -> CaseResult:
     from crgame_ros.evaluation.results.cell_rows import vehicle_rows
     from crgame_ros.recording.export import write_scenario
     from crgame_ros.recording.offline_recording import GAME_FILE, write_recording
+    from crgame_ros.simulation.contacts import contacts_of
     from crgame_ros.simulation.offline import run_offline
     from crgame_ros.simulation.setup import build_setup
     began = time.perf_counter()
@@ -132,7 +133,7 @@ def run_case(case: Case, out: Path) -> CaseResult:
         game = _adapted(game, case)
         result = run_offline(build_setup(game), keep_messages=True)
         run = Run(case.name, result=result, scoring='drives')
-        rows = vehicle_rows(run, result)
+        rows = vehicle_rows(run, result, contacts_of(result))
         broken = tuple(tuple(shortfalls(each, rows)) for each in expectations)
         folder = None
         if any(broken):

@@ -101,7 +101,8 @@ def test_the_interval_of_a_probability_holds_what_it_says() -> None:
 def search(folder: Path, *words: str) -> 'subprocess.Popen[str]':
     return subprocess.Popen(
         [sys.executable, '-m', 'crgame_ros.cli', 'search', 'cut_in_family', '--minimise',
-         'min_distance', '--budget', '40', '--keep', '1', '--out', str(folder), *words],
+         'min_distance', '--budget', '40', '--keep', '1', '--unavoidable', '--out', str(folder),
+         *words],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
 
 

@@ -5,6 +5,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+from crgame_ros.analysis.blame.blame import blame_of, KINDS
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
     Column,
@@ -16,7 +17,7 @@ from crgame_ros.analysis.tables.column import (
 )
 from crgame_ros.analysis.tables.part import part_rows
 from crgame_ros.analysis.tables.vehicles import VEHICLE_PARTS
-from crgame_ros.simulation.contacts import contacts_of
+from crgame_ros.simulation.contacts import Contact
 from crgame_ros.simulation.offline import OfflineResult
 
 STATUSES = ('ok', 'error', 'refused', 'timeout', 'memory', 'died')
@@ -52,6 +53,10 @@ CELLS = TableDeclaration('cells', 'a cell', ('cell',), (
     Column('stopped', FLAG, '', "whether a human's violation ended it", empty=FAILED)))
 _OUTCOME = (
     Column('collided', FLAG, '', 'whether it touched anything'),
+    Column('blame', TEXT, '', 'whether it could have avoided its first contact',
+           variant='docs/search.md, "Who is to blame"',
+           empty='it had no contact, or a human drives it',
+           values=tuple(kind for kind in KINDS if kind)),
     Column('left_road', FLAG, '', 'whether a part of its footprint was off the road'),
     Column('accepted_ratio', NUMBER, '1', "share of its planner's answers that were accepted and "
            'no fallback', empty='a human drives it'))
@@ -71,16 +76,25 @@ WORK = TableDeclaration('work', 'the computing of a cell', ('cell',), (
 TABLES_OF_CELLS = (CELLS, VEHICLES_OF_CELLS, WORK)
 
 
-def outcome_of(result: OfflineResult) -> dict[str, object]:
-    """Return the values of a run in the cell's row."""
+def outcome_of(result: OfflineResult, contacts: Sequence[Contact]) -> dict[str, object]:
+    """
+    Return the values of a run in the cell's row.
+
+    :param contacts: of the run.
+    """
     steps = len(result.vehicle_states) - 1
     return {'status': 'ok', 'simulated_s': steps * result.setup.scheduler.dt_s,
-            'state_hash': result.state_hash, 'contacts': len(contacts_of(result)),
+            'state_hash': result.state_hash, 'contacts': len(contacts),
             'stopped': result.stop is not None}
 
 
-def vehicle_rows(run: Run, result: OfflineResult) -> list[dict[str, object]]:
-    """Return the rows of a run's driven vehicles."""
+def vehicle_rows(run: Run, result: OfflineResult,
+                 contacts: Sequence[Contact]) -> list[dict[str, object]]:
+    """
+    Return the rows of a run's driven vehicles.
+
+    :param contacts: of the run.
+    """
     columns: dict[str, Sequence[Any]] = part_rows(VEHICLE_PARTS, run)
     ids = columns.pop('id')
     del columns['run']
@@ -88,9 +102,12 @@ def vehicle_rows(run: Run, result: OfflineResult) -> list[dict[str, object]]:
     for place, vehicle in enumerate(ids):
         verdicts = [item for item in result.violations if item.vehicle_id == vehicle]
         record = result.planners.get(vehicle)
+        collided = any(item.collision for item in verdicts)
         rows.append({
             'vehicle': vehicle,
-            'collided': any(item.collision for item in verdicts),
+            'collided': collided,
+            'blame': blame_of(result, contacts, vehicle, latest=False).kind or None
+            if collided and record is not None else None,
             'left_road': any(item.off_road for item in verdicts),
             'accepted_ratio': None if record is None else record.accepted_ratio,
             **{name: _plain(values[place]) for name, values in columns.items()}})
