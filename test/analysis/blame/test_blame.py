@@ -57,6 +57,17 @@ class LaneChanger(ConstantVelocityPlanner):
             ego, place, 30, request.time_step_s, lambda i, s, speed: 0.0))
 
 
+class Braking(ConstantVelocityPlanner):
+    """Brakes gently from x = 50 m on, whatever is ahead."""
+
+    name: ClassVar[str] = 'braking'
+
+    def plan(self, request: PlanRequest) -> Plan:
+        return self.answer(request, self.follower.drive(
+            request.ego, self.locate(request), 30, request.time_step_s,
+            lambda i, s, speed: -3.0 if request.ego.x > 50.0 else 0.0))
+
+
 class Racer(ConstantVelocityPlanner):
     """Accelerates from x = 50 m on, and looks at nobody."""
 
@@ -75,7 +86,7 @@ def driven(objects: Sequence[Object], planner: str = 'constant-velocity', vehicl
         'scenario': 'ZAM_CutIn-1_1_T-1.xml', 'duration': duration_s, 'humans': [],
         'avs': [{'id': 'av0', 'planning_problem': 100, 'planner': planner, 'vehicle': vehicle}],
         'objects': list(objects)}
-    with PLANNERS.giving({'lane-changer': LaneChanger, 'racer': Racer}):
+    with PLANNERS.giving({planner.name: planner for planner in (LaneChanger, Racer, Braking)}):
         return run_offline(build_setup(parse_game(values, 'game', scenarios_directory())))
 
 
@@ -210,6 +221,24 @@ def test_an_av_knows_that_it_will_accelerate() -> None:
     found = judged(result, BRAKING)
     assert found.kind == 'avoidable'
     assert found.since_s == pytest.approx(0.01 * contact.n - 3.0, abs=0.15)
+
+
+def test_an_av_that_brakes_too_gently_knew_it_before() -> None:
+    # The leader drives 10 m/s, and brakes when the AV has nearly become as slow. As the AV drove,
+    # all would have been well until then; at its speed, it was 3 s away 29.7 m before.
+    leader = {'id': 'leader', 'kind': 'bicycle', 'type': 'car', 'speeds': [10.0, 10.0, 0.0],
+              'path': [[52.2, 0.0], [108.25, 0.0], [108.45, 0.0]], 'deceleration': 8.0}
+    found = judged(driven([leader], 'braking'))
+    assert found.kind == 'avoidable' and found.since_s == pytest.approx(0.8, abs=0.2)
+
+
+def test_an_escape_stays_on_the_road() -> None:
+    # To pass the block on its left, an AV moves aside by 2.3 m; in the left lane, there is 1.07 m.
+    swerves = tuple(item for item in MANOEUVRES if item.aside > 0.0 and item.along >= 0.0)
+    for planner, y, kind in (('constant-velocity', 0.0, 'avoidable'),
+                             ('lane-changer', 3.75, 'no_escape')):
+        block = {**parked(160.0, y - 1.5), 'size': [4.5, 6.0]}
+        assert judged(driven([block], planner), swerves).kind == kind
 
 
 def from_behind(x: float, y: float) -> Object:
