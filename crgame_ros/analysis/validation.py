@@ -32,8 +32,10 @@ from crgame_ros.scenario.export_network import schema_errors, solution_schema_er
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.schema.file_kinds import FILE_KINDS, FileKind
 from crgame_ros.schema.reading import faults_of
+from crgame_ros.schema.writing import write
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.timing.late_steps import LATE_KEYS
+from crgame_ros.variation.space import space_of
 from crgame_ros.yaml_text import read_text, read_yaml
 
 _FILES, _WORDS = 'files', re.compile(r'words\..*\.yaml')
@@ -233,7 +235,10 @@ def _yaml(path: Path, _progress: Progress | None) -> FileVerdict:
     if file_kind.declared is Game and not faults:
         from crgame_ros.game.file import parse_game
         try:
-            remarks = build_setup(parse_game(values, str(path), path.parent)).notices
+            game = parse_game(values, str(path), path.parent)
+            remarks = build_setup(game).notices
+            if game.vary:
+                space_of(write(game, game.base), str(path)).check(game.base, str(path))
         except InputError as error:
             faults.append(str(error))
     return FileVerdict(file_kind.title.lower(), tuple(faults[:_SHOWN]), remarks)

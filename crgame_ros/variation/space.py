@@ -194,7 +194,7 @@ class VariantSpace:
                 for axis, share in zip(self.axes, point, strict=True)}
 
     def point(self, variant: Variant) -> Point:
-        """Return the point (D) of the unit cube that stands for a variant."""
+        """Return where in the unit cube a variant lies, (D)."""
         return np.array([axis.share(variant[axis.name]) for axis in self.axes])
 
     def is_allowed(self, variant: Variant) -> bool:

@@ -56,6 +56,19 @@ def test_the_folder_of_a_run_is_all_its_files(run: Path,
         'recording', 'CommonRoad scenario', 'timing report'}
 
 
+def test_what_cannot_vary_in_a_game_is_told(tmp_path: Path,
+                                            capsys: pytest.CaptureFixture[str]) -> None:
+    text = (scenarios_directory() / 'cut_in_family.yaml').read_text().replace(
+        'scenario: ', f'scenario: {scenarios_directory()}/')
+    file = tmp_path / 'game.yaml'
+    file.write_text(text)
+    assert _told(file, capsys)[0] == 0
+    file.write_text(text.replace('key: objects.b0.deceleration', 'key: objects.b7.deceleration'))
+    code, out, err = _told(file, capsys)
+    assert (code, out) == (2, f'{file}: game file, not valid\n')
+    assert "vary[2]: there is no entry 'b7'; there are b0" in err
+
+
 def test_all_that_is_wrong_with_a_game_is_told(tmp_path: Path,
                                                capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / 'game.yaml'
