@@ -7,13 +7,13 @@ from typing import Any
 
 from crgame_ros.analysis.report.outcome_section import outcome_section
 from crgame_ros.analysis.runs.run import Run
+from crgame_ros.evaluation.judging import check_expectations, shortfalls
 from crgame_ros.evaluation.results.cell_rows import vehicle_rows
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
-from crgame_ros.verdict.judging import check_expectations, shortfalls
 from lxml import etree
 import pytest
 
