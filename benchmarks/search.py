@@ -40,8 +40,8 @@ def main() -> None:
     add = parser.add_argument
     add('--planners', nargs='+', choices=PLANNERS, default=list(PLANNERS))
     add('--seeds', type=int, default=10)
-    add('--budget', type=int, default=160, help='of a search')
-    add('--random', type=int, default=1500, help='random runs')
+    add('--budget', type=int, default=100, help='of a search')
+    add('--random', type=int, default=1000, help='random runs')
     add('--sampler', default='tpe')
     add('--speed', action='store_true', help='measure one search of 2,000 runs instead')
     given = parser.parse_args()

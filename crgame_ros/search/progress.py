@@ -10,8 +10,9 @@ from typing import TextIO
 from crgame_ros.evaluation.progress import BAR_PERIOD_S, duration_text, PERIOD_S
 from crgame_ros.search.trials import Outcome
 
-# The time that a search takes is stated after so many runs.
-_STATED_AFTER = 24
+# The time that a search takes is stated after so many runs; to choose variants takes longer, the
+# more is known.
+_STATED_AFTER, _MORE = 24, 1.25
 
 
 class SearchProgress:
@@ -52,7 +53,7 @@ class SearchProgress:
                 self._print(f'{outcome.status}: {dict(outcome.variant)}: {outcome.reason}')
         if not self._stated and self._new == _STATED_AFTER and self._left_s(now_s) > 0.0:
             self._stated = True
-            self._print(f'{self._budget} runs: about {duration_text(self._left_s(now_s))} to go')
+            self._print(f'{self._budget} runs: about {duration_text(_MORE * self._left_s(now_s))} to go')
         if now_s - self._told_s >= (BAR_PERIOD_S if self._bar else PERIOD_S):
             self._told_s = now_s
             self._write(self._line(now_s), end='')
