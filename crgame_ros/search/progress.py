@@ -53,7 +53,8 @@ class SearchProgress:
                 self._print(f'{outcome.status}: {dict(outcome.variant)}: {outcome.reason}')
         if not self._stated and self._new == _STATED_AFTER and self._left_s(now_s) > 0.0:
             self._stated = True
-            self._print(f'{self._budget} runs: about {duration_text(_MORE * self._left_s(now_s))} to go')
+            stated = duration_text(_MORE * self._left_s(now_s))
+            self._print(f'{self._budget} runs: about {stated} to go')
         if now_s - self._told_s >= (BAR_PERIOD_S if self._bar else PERIOD_S):
             self._told_s = now_s
             self._write(self._line(now_s), end='')

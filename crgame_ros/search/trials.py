@@ -23,6 +23,8 @@ from crgame_ros.game.objects import Role
 from crgame_ros.search.settings import SearchSettings
 
 Variant = Mapping[str, object]
+# Variants that are run before any of their outcomes is told.
+_TOGETHER = 32
 # Blames of a contact that an AV could have avoided, and of a run without a contact.
 AVOIDABLE = ('', 'avoidable')
 
@@ -124,8 +126,10 @@ class Trials:
                     break
                 new[text] = variant
             texts.append(text)
-        if new:
-            self._run(new)
+        # In parts, so that progress is seen and few rows are in memory.
+        items = list(new.items())
+        for first in range(0, len(items), _TOGETHER):
+            self._run(dict(items[first:first + _TOGETHER]))
         return [self._by_text[text] for text in texts]
 
     def _run(self, new: Mapping[str, Variant]) -> None:
