@@ -30,7 +30,7 @@ FAMILY = ROOT / 'scenarios' / 'cut_in_family.yaml'
 # Name: planner, options, and range of gaps [m] in which about one variant of 300 fails.
 PLANNERS = {'idm': ('idm', (), (15, 60)),
             'weak': ('idm', ('b_max=6',), (24, 70)),
-            'reactive': ('reactive', (), (15, 60))}
+            'reactive': ('reactive', (), (8, 60))}
 
 
 def main() -> None:
