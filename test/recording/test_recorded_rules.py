@@ -12,6 +12,7 @@ from crgame_ros.evaluation.results.cell_rows import vehicle_rows
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
+from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from lxml import etree
@@ -51,7 +52,8 @@ def lit(folder: Path, *, human_red: int = 200, sign: bool = False) -> Path:
 
 def driven(game: Path) -> tuple[OfflineResult, dict[str, dict[str, object]]]:
     result = run_offline(build_setup(load_game(game)))
-    rows = vehicle_rows(Run('lit', result=result, scoring='none'), result)
+    rows = vehicle_rows(Run('lit', result=result, scoring='none'), result,
+                        contacts_of(result))
     return result, {str(row['vehicle']): row for row in rows}
 
 
