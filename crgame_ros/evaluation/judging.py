@@ -65,7 +65,7 @@ def known_measure(name: str, where: str) -> str:
     :param where: for messages.
     :raises InputError: if there is no such measure.
     """
-    found = name if name in KNOWN else f'{_WORST}{name}'
+    found = _full_name(name)
     if found not in KNOWN:
         near = get_close_matches(name, KNOWN, 3)
         raise InputError(f'there is no measure {name[:60]!r}', where,
@@ -74,13 +74,17 @@ def known_measure(name: str, where: str) -> str:
     return found
 
 
+def _full_name(name: str) -> str:
+    return name if name in KNOWN else f'{_WORST}{name}'
+
+
 def value_of(measure: str, row: Row) -> float | None:
     """
     Return the value of a measure of a vehicle; None where it is undefined.
 
     :param row: of the table `vehicles` of an evaluation.
     """
-    measure = measure if measure in KNOWN else f'{_WORST}{measure}'
+    measure = _full_name(measure)
     if measure == GOAL_REACHED_S:
         # Never reached is later than any time.
         reached = _number(row.get('score_reached_s'))

@@ -35,12 +35,19 @@ def write_variant_pages(folder: Path, grid: CellGrid, goals: Sequence[str]) -> I
     :return: the files.
     :raises InputError: if a part is damaged, or a page cannot be written.
     """
+    # The tables are read once for all games.
+    rows: dict[str, list[tuple[Row, Sequence[Row]]]] = {
+        scene.game: [] for scene in grid.scenes if scene.variants}
+    for row, vehicles in stored_rows(folder):
+        if row['game'] in rows:
+            rows[row['game']].append((row, vehicles))
     for scene in grid.scenes:
         if scene.variants:
-            yield _write(folder, grid, scene, goals or _GOALS)
+            yield _write(folder, grid, scene, rows.pop(scene.game), goals or _GOALS)
 
 
-def _write(folder: Path, grid: CellGrid, scene: CellScene, goals: Sequence[str]) -> Path:
+def _write(folder: Path, grid: CellGrid, scene: CellScene,
+           rows: Sequence[tuple[Row, Sequence[Row]]], goals: Sequence[str]) -> Path:
     space = space_of(scene.values, scene.label)
     expectations = expectations_of(scene.values, scene.label)
     axes, nominal = [axis_values(axis) for axis in space.axes], dict(space.nominal)
@@ -48,7 +55,7 @@ def _write(folder: Path, grid: CellGrid, scene: CellScene, goals: Sequence[str])
     if len(planners) > 1:
         axes.append({'name': 'planner', 'values': planners})
     points = [_point(row, vehicles, expectations, goals)
-              for row, vehicles in stored_rows(folder) if row['game'] == scene.game]
+              for row, vehicles in rows]
     failures = sum(point.verdict == 'failure' for point in points)
     view = VariantsView(
         f'{scene.label}: its variants',

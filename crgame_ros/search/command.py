@@ -78,7 +78,7 @@ def run(values: argparse.Namespace) -> int:
     from crgame_ros.search.findings import write_findings
     from crgame_ros.search.page import write_search_page
     from crgame_ros.search.progress import SearchProgress
-    from crgame_ros.search.search import begin, refuse_evaluation, run_search
+    from crgame_ros.search.search import begin, run_search
     from crgame_ros.search.text import lines, results_text
     from crgame_ros.whole_file import write_text
     given = Path(values.game)
@@ -87,7 +87,6 @@ def run(values: argparse.Namespace) -> int:
     else:
         settings = _settings(values, _game(given, values))
         folder = values.out or SEARCHES / Path(settings.game).stem
-        refuse_evaluation(folder)
         begin(settings, folder)
     settings = SearchSettings.read(folder)
     progress = SearchProgress(settings.budget)
@@ -95,10 +94,12 @@ def run(values: argparse.Namespace) -> int:
         result = run_search(folder, _computing(values), progress.began, progress.ended)
     finally:
         progress.close()
-    write_text(results_text(result), folder / 'results.json')
+    # Once: the boundary's model is asked for them.
+    words = list(lines(result))
+    write_text(results_text(result, words), folder / 'results.json')
     found = write_findings(result, folder, values.keep)
-    page = write_search_page(result, found, folder)
-    for line in lines(result):
+    page = write_search_page(result, words, found, folder)
+    for line in words:
         print(line)
     if found:
         print(f'drive one yourself: ./run.sh {found[-1][1] / "live.yaml"}')

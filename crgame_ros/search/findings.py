@@ -7,22 +7,21 @@ from dataclasses import replace
 from pathlib import Path
 import shutil
 
-from crgame_ros.analysis.report.file import write_report
+from crgame_ros.analysis.report.run_files import write_run_files
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.evaluation.cell_run import cell_setup
 from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.paths import make_folder
-from crgame_ros.recording.export import write_scenario
-from crgame_ros.recording.offline_recording import GAME_FILE, write_recording
 from crgame_ros.search.live_game import for_a_person
 from crgame_ros.search.search import SearchResult
+from crgame_ros.search.text import values_text
 from crgame_ros.search.trials import Outcome
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.variation.space import VariantSpace
 from crgame_ros.whole_file import write_text
 
 FOUND = 'found'
-REPORT, LIVE = 'report.html', 'live.yaml'
+LIVE = 'live.yaml'
 # Two findings are no closer than this, in ranges or standard deviations.
 _APART = 0.1
 
@@ -71,15 +70,12 @@ def write_findings(result: SearchResult, folder: Path, number: int) -> list[tupl
         make_folder(out, 'choose another place with --out')
         setup = cell_setup(cells[outcome.key], place.store.folder)
         # The title tells people which variant they have before them.
-        values = ', '.join(f'{key} {value}' for key, value in outcome.variant.items())
+        values = values_text(outcome.variant)
         game = replace(setup.game, title=f'{setup.game.title} ({values})'.strip(),
                        expect=result.expectations)
         offline = run_offline(setup, keep_messages=True)
         run = Run(f'{Path(result.settings.game).stem}: {values}', result=offline)
-        write_report([run], out / REPORT)
-        write_scenario(run.log, out)
-        write_recording(offline, out)
-        write_text(game.dump(), out / GAME_FILE)
+        write_run_files(run, offline, game, out)
         write_text(for_a_person(game).dump(), out / LIVE)
         found.append((outcome, out))
     return found

@@ -36,7 +36,6 @@ class SearchResult:
 
     :param settings: of the search.
     :param space: of the variants.
-    :param values: values of the game, with references instead of its files.
     :param expectations: what a run had to keep.
     :param outcomes: of all variants, in the order in which they were chosen.
     :param phases: name and number of runs of each part.
@@ -47,7 +46,6 @@ class SearchResult:
 
     settings: SearchSettings
     space: VariantSpace
-    values: dict[str, object]
     expectations: tuple[Expectation, ...]
     outcomes: tuple[Outcome, ...]
     phases: tuple[tuple[str, int], ...]
@@ -76,6 +74,9 @@ def begin(settings: SearchSettings, folder: Path) -> None:
 
     :raises InputError: if anything cannot be used, or another search is in the folder.
     """
+    there = (folder / GRID_FILE).exists()
+    if there and not (folder / SEARCH_FILE).exists():
+        raise InputError('an evaluation is in it', str(folder), 'name another --out')
     path = Path(settings.game)
     game = load_game(path)
     check_expectations(game, str(path))
@@ -85,7 +86,6 @@ def begin(settings: SearchSettings, folder: Path) -> None:
     place = EvaluationFolder(folder)
     choice = PlannerChoice(settings.planner or OWN, options=dict(settings.options))
     plan = EvaluationPlan(games=(str(path.resolve()),), planners=(choice,), seeds=[game.seed])
-    there = (folder / GRID_FILE).exists()
     if there:
         settings.write(folder)
     grid = make_grid(plan, place.store)
@@ -144,20 +144,10 @@ def run_search(folder: Path, computing: Computing, began: Began, told: Told) -> 
         raise CrgameError('no variant could be run'
                           + (f': {first.reason}' if first is not None else ''))
     return SearchResult(
-        settings, space, dict(values), expectations, tuple(trials.outcomes), tuple(phases),
+        settings, space, expectations, tuple(trials.outcomes), tuple(phases),
         smallest, probability,
         Boundary(space, trials.known) if can_learn(trials.known) else None)
 
 
 def _without_variants(grid: CellGrid) -> CellGrid:
     return replace(grid, scenes=tuple(replace(scene, variants=()) for scene in grid.scenes))
-
-
-def refuse_evaluation(folder: Path) -> None:
-    """
-    Refuse a folder with an evaluation that is no search.
-
-    :raises InputError: if it is one.
-    """
-    if (folder / GRID_FILE).exists() and not (folder / SEARCH_FILE).exists():
-        raise InputError('an evaluation is in it', str(folder), 'name another --out')

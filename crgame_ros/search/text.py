@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a search found, in words and as data."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 import json
 
@@ -44,10 +44,10 @@ def lines(result: SearchResult) -> Iterator[str]:
                  if (value := outcome.values[place]) is not None and not outcome.excused]
         if found:
             value, outcome = min(found, key=lambda pair: (pair[0], pair[1].number))
-            yield f'{goal.told}: {goal.sign * value:.4g} ({_values(outcome)})'
+            yield f'{goal.told}: {goal.sign * value:.4g} ({values_text(outcome.variant)})'
     if len(result.settings.goals) > 1:
         front = worst_compromises(result)
-        shown = '; '.join(_values(outcome) for outcome in front[:3])
+        shown = '; '.join(values_text(outcome.variant) for outcome in front[:3])
         yield (f'{len(front)} on the Pareto front, where no other variant is as bad in all and '
                f'worse in one: {shown}{" …" if len(front) > 3 else ""}')
     if result.smallest is not None:
@@ -76,8 +76,9 @@ def _share(value: float) -> str:
     return f'{100.0 * value:.3g} %'
 
 
-def _values(outcome: Outcome) -> str:
-    return ', '.join(f'{name} {value}' for name, value in outcome.variant.items())
+def values_text(variant: Variant) -> str:
+    """Return the values of a variant for people."""
+    return ', '.join(f'{name} {value}' for name, value in variant.items())
 
 
 def _thresholds(result: SearchResult) -> Iterator[str]:
@@ -107,14 +108,18 @@ def told(outcome: Outcome) -> str:
     return outcome.excused or '; '.join(outcome.broken) or outcome.reason
 
 
-def document(result: SearchResult) -> dict[str, object]:
-    """Return what was found as JSON-compatible values."""
+def document(result: SearchResult, found: Sequence[str]) -> dict[str, object]:
+    """
+    Return what was found as JSON-compatible values.
+
+    :param found: the same in words, as `lines` yields it.
+    """
     space = result.space
     return {
         'game': result.settings.game, 'planner': result.settings.planner or 'own',
         'goals': [{'measure': goal.measure, 'sign': goal.sign} for goal in result.settings.goals],
         'expectations': [each.told() for each in result.expectations],
-        'lines': list(lines(result)), 'nominal': space.nominal,
+        'lines': list(found), 'nominal': space.nominal,
         'outcomes': [{
             'cell': outcome.key, 'variant': dict(outcome.variant),
             'values': list(outcome.values), 'verdict': verdict(outcome), 'told': told(outcome)}
@@ -140,6 +145,6 @@ def boundary_slices(result: SearchResult) -> Iterator[dict[str, object]]:
                    'probabilities': found.mean(axis=2).round(3).tolist()}
 
 
-def results_text(result: SearchResult) -> str:
-    """Return what was found as JSON."""
-    return json.dumps(document(result), ensure_ascii=False, allow_nan=False) + '\n'
+def results_text(result: SearchResult, found: Sequence[str]) -> str:
+    """Return what `document` holds as JSON."""
+    return json.dumps(document(result, found), ensure_ascii=False, allow_nan=False) + '\n'

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_batches import CellBatches
 from crgame_ros.evaluation.cell_grid import CellGrid
 from crgame_ros.evaluation.cell_process import Limits
@@ -21,8 +20,8 @@ from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.objects import Role
 from crgame_ros.search.settings import SearchSettings
+from crgame_ros.variation.space import Variant
 
-Variant = Mapping[str, object]
 # Variants that are run before any of their outcomes is told.
 _TOGETHER = 32
 # Blames of a contact that an AV could have avoided, and of a run without a contact.
@@ -134,9 +133,10 @@ class Trials:
 
     def _run(self, new: Mapping[str, Variant]) -> None:
         scene = self._grid.scenes[0]
-        cells = list(replace(self._grid, scenes=(
-            replace(scene, variants=tuple(new.values())),)))
-        missing = [cell for cell in cells if cell.key not in self._earlier]
+        cells = {cell.key: cell for cell in replace(self._grid, scenes=(
+            replace(scene, variants=tuple(new.values())),))}
+        missing = [cell for key, cell in cells.items() if key not in self._earlier]
+        known = cells.keys() & self._earlier.keys()
         self._grid = replace(self._grid, scenes=(
             replace(scene, variants=(*scene.variants, *new.values())),))
         if missing and self._grid.engine != engine_digest():
@@ -152,14 +152,14 @@ class Trials:
                 self._parts.add(*rows)
                 for row in rows:
                     self._earlier[row['cell']['cell']] = row
-        for cell, (text, variant) in zip(cells, new.items(), strict=True):
+        for key, (text, variant) in zip(cells, new.items(), strict=True):
             # What is kept of a run is small: memory does not grow with the tables.
-            outcome = self._outcome(cell, variant, self._earlier.pop(cell.key))
+            outcome = self._outcome(key, variant, self._earlier.pop(key))
             self.outcomes.append(outcome)
             self._by_text[text] = outcome
-            self._told(outcome, cell in missing)
+            self._told(outcome, key not in known)
 
-    def _outcome(self, cell: Cell, variant: Variant, row: Mapping[str, Any]) -> Outcome:
+    def _outcome(self, key: str, variant: Variant, row: Mapping[str, Any]) -> Outcome:
         status = str(row['cell']['status'])
         vehicles = row['vehicles']
         broken = [line for each in self._expectations for line in shortfalls(each, vehicles)] \
@@ -169,7 +169,7 @@ class Trials:
         excused = '' if self._settings.unavoidable or not broken or not blames \
             or any(blame in AVOIDABLE for blame in blames) else blames[0]
         return Outcome(
-            len(self.outcomes), dict(variant), cell.key, status,
+            len(self.outcomes), dict(variant), key, status,
             str(row['cell'].get('reason') or ''),
             tuple(worst_of(goal.measure, vehicles, goal.sign)
                   for goal in self._settings.goals), tuple(broken), excused)

@@ -24,6 +24,7 @@ from crgame_ros.game.variation_spec import (
     VARY,
 )
 from crgame_ros.schema.reading import read
+from crgame_ros.schema.writing import write
 from crgame_ros.variation.expression import Expression
 from crgame_ros.variation.key_path import value_at, with_value
 import numpy as np
@@ -257,6 +258,5 @@ def game_of(game: Game, variant: Variant, where: str) -> Game:
 
     :raises InputError: if it cannot be read.
     """
-    from crgame_ros.schema.writing import write
     space = VariantSpace(game.vary, write(game, game.base), where)
     return parse_game(space.game_values(variant), where, game.base)

@@ -14,9 +14,6 @@ from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import Game
-from crgame_ros.whole_file import write_text
-
-REPORT = 'report.html'
 
 
 def replay_command(folder: Path) -> str:
@@ -115,12 +112,10 @@ def run_case(case: Case, out: Path) -> CaseResult:
     :param out: folder for the reports and recordings of runs that break an expectation.
     """
     # Imported here: the process that only hands cases out does not need them.
-    from crgame_ros.analysis.report.file import write_report
+    from crgame_ros.analysis.report.run_files import write_run_files
     from crgame_ros.analysis.runs.run import Run
     from crgame_ros.evaluation.judging import check_expectations, shortfalls
     from crgame_ros.evaluation.results.cell_rows import vehicle_rows
-    from crgame_ros.recording.export import write_scenario
-    from crgame_ros.recording.offline_recording import GAME_FILE, write_recording
     from crgame_ros.simulation.contacts import contacts_of
     from crgame_ros.simulation.offline import run_offline
     from crgame_ros.simulation.setup import build_setup
@@ -140,10 +135,7 @@ def run_case(case: Case, out: Path) -> CaseResult:
             folder = out / '-'.join((
                 case.game.stem, str(case.seed), *(case.copy[:1] if case.copy else ())))
             folder.mkdir(parents=True, exist_ok=True)
-            write_report([run], folder / REPORT)
-            write_recording(result, folder, replace=True)
-            write_scenario(run.log, folder)
-            write_text(game.dump(), folder / GAME_FILE)
+            write_run_files(run, result, game, folder)
     except CrgameError as error:
         return CaseResult(case, expectations, (), str(error), time.perf_counter() - began)
     return CaseResult(case, expectations, broken, '', time.perf_counter() - began, folder)

@@ -63,7 +63,8 @@ def run(values: argparse.Namespace) -> int:
     :return: exit code: 0 if every expectation is kept, else 1.
     :raises InputError: if there is nothing to run, or a file cannot be written.
     """
-    from crgame_ros.verdict.cases import replay_command, REPORT, run_cases
+    from crgame_ros.analysis.report.command import REPORT_FILE
+    from crgame_ros.verdict.cases import replay_command, run_cases
     from crgame_ros.verdict.page import write_page
     from crgame_ros.verdict.verdicts import broken_lines, junit_xml, verdicts_of
     from crgame_ros.whole_file import write_bytes, write_text
@@ -87,7 +88,7 @@ def run(values: argparse.Namespace) -> int:
     for result in results:
         # A copy that breaks what its original breaks tells nothing new.
         if result.folder is not None and result.case.name in told:
-            print(f'       {result.case.name}: {result.folder / REPORT}')
+            print(f'       {result.case.name}: {result.folder / REPORT_FILE}')
             print(f'       {" " * len(result.case.name)}  {replay_command(result.folder)}')
     if values.junit is not None:
         write_bytes(junit_xml(verdicts, 'crgame test'), values.junit)

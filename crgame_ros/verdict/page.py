@@ -7,7 +7,8 @@ from html import escape
 from itertools import groupby
 from pathlib import Path
 
-from crgame_ros.verdict.cases import CaseResult, replay_command, REPORT
+from crgame_ros.analysis.report.command import REPORT_FILE
+from crgame_ros.verdict.cases import CaseResult, replay_command
 from crgame_ros.verdict.verdicts import Verdict
 from crgame_ros.whole_file import write_text
 
@@ -49,7 +50,7 @@ def _row(verdict: Verdict, out: Path) -> str:
         copy = f', {result.case.copy[0]}' if result.case.copy else ''
         name = escape(f'seed {result.case.seed}{copy}')
         if result.folder is not None:
-            link = (result.folder / REPORT).relative_to(out).as_posix()
+            link = (result.folder / REPORT_FILE).relative_to(out).as_posix()
             name = f'<a href="{escape(link)}">{name}</a>'
         told = f'<small>{escape("; ".join(lines))}</small>'
         if result.folder is not None:
