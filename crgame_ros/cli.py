@@ -61,7 +61,7 @@ TOOLS = (
     _Tool('study', 'experiments with people: plan them, and find mistakes',
           'crgame_ros.study.conduct.study_command'),
     _Tool('validate', 'whether files are valid: scenarios, games, recordings, tables',
-          'crgame_ros.analysis.validate_command'),
+          'crgame_ros.verdict.validate_command'),
     _Tool('new', 'a game file for any scenario, with seats for several people',
           'crgame_ros.new_command'),
     _Tool('import', 'maps and data sets of other formats, to drive in',

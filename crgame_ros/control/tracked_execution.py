@@ -12,7 +12,7 @@ from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.vehicle.models import VehicleModel
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
-from crgame_ros.vehicle.stopping import braking_acceleration
+from crgame_ros.vehicle.stopping import braking_acceleration, firm_braking
 
 # Age of the plan against which errors are measured [s]. The newest plan starts at the vehicle ten
 # times a second, so the errors against it are always small.
@@ -116,7 +116,8 @@ class TrackedExecution:
     def _braking(self, state: VehicleState) -> Control:
         # The tracker's expectations of the vehicle end here.
         self.tracker.reset()
-        return Control(state.steering_angle, braking_acceleration(state.speed))
+        return Control(state.steering_angle,
+                       braking_acceleration(state.speed, firm_braking(self.vehicle)))
 
     def _moved(self, state: VehicleState, control: Control) -> VehicleState:
         return self.model.step(state, control.steering_angle, control.acceleration, self.dt_s)

@@ -40,17 +40,21 @@ CLEAR_M = 30_000.0
 @dataclass(frozen=True)
 class EnvironmentSpec:
     """
-    Light and air in the displayed world; they do not affect the sensors of AVs.
+    Light, air and the grip of the road. Light and air do not affect the sensors of AVs.
 
     :param light: day or dusk; None takes the scenario's, else day.
     :param visibility: meteorological visibility, at which 5 % of a contrast is left (Koschmieder)
         [m]; None takes the scenario's, else 30 km.
+    :param friction: peak friction of the road: 0.4 to 0.6 when wet, 0.1 to 0.2 on ice. It limits
+        how driven vehicles accelerate, brake and turn, and is told to planners; traffic agents
+        have limits of their own. None keeps the friction of each vehicle's parameters [-].
     """
 
     FORM: ClassVar[Form] = Form('see docs/games.md for the keys')
 
     light: Light | None = None
     visibility: Annotated[float, Within(10.0, 100_000.0)] | None = None
+    friction: Annotated[float, Within(0.05, 2.0)] | None = None
 
 
 DEFAULT_PLANNER = 'idm'
@@ -184,6 +188,7 @@ class AvSpec:
         lanes for cars.
     :param spawn: `problem` starts at the planning problem's pose; `lanelet` at the nearest pose
         of lanelet geometry, aligned to the former by CRG 6-10.
+    :param speed: at its start; None takes the planning problem's [m/s].
     :param execution: `perfect` follows the plan exactly (CRG), `tracked` by a controller on a
         vehicle model (FS II-C).
     :param tracker: the controller of a tracked AV.
@@ -201,6 +206,7 @@ class AvSpec:
     planning_problem: int | None = None
     vehicle: Annotated[str, Named()] = AUTO
     spawn: Annotated[Literal['problem', 'lanelet'], Meaning('auto', 'problem')] = 'problem'
+    speed: Annotated[float, Within(0.0, 100.0)] | None = None
     execution: Literal['perfect', 'tracked'] = 'perfect'
     tracker: TrackerSpec = TrackerSpec()
     dynamics: ModelSpec = ModelSpec('dynamic-bicycle')

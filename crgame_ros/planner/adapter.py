@@ -16,7 +16,7 @@ from crgame_ros.planner.plan_check import check_start
 from crgame_ros.planner.road_limit import RoadLimit
 from crgame_ros.planner.rollout import braking_plan
 from crgame_ros.vehicle.state import StateColumn, VehicleState
-from crgame_ros.vehicle.stopping import FIRM_BRAKING
+from crgame_ros.vehicle.stopping import firm_braking
 import numpy as np
 
 Clock = Callable[[], float]
@@ -62,16 +62,13 @@ class PlannerAdapter:
 
     :param planner: the planner.
     :param clock: seconds from a steady clock, to time each call; None measures nothing.
-    :param deceleration: of braking plans [m/s^2]
     """
 
-    def __init__(self, planner: Planner, clock: Clock | None = None,
-                 deceleration: float = FIRM_BRAKING) -> None:
+    def __init__(self, planner: Planner, clock: Clock | None = None) -> None:
         self.planner = planner
         self.statistics = PlannerStatistics()
         self.last_reason: str | None = None
         self._clock = clock
-        self._deceleration = deceleration
         self._setup_failure: str | None = 'the planner was not set up'
         self._last_plan: Plan | None = None
 
@@ -83,6 +80,7 @@ class PlannerAdapter:
             until the next setup.
         """
         self._vehicle = context.vehicle
+        self._deceleration = firm_braking(context.vehicle)
         self._last_plan = None
         self._setup_failure = None
         self.last_reason = None

@@ -205,7 +205,9 @@ class IdmPlanner(PathPlanner):
         self._desired: list[float] = np.minimum(desired, vehicle.max_speed).tolist()
         self._admissible: list[float] = admissible_speeds(
             driving, desired, vehicle, self._lateral_acceleration, self._model.b).tolist()
-        self._stop_lines = StopLines(context.scenario, driving, self._model.b_max,
+        # No planner brakes harder than the road allows.
+        self._hardest = min(self._model.b_max, vehicle.max_acceleration)
+        self._stop_lines = StopLines(context.scenario, driving, self._hardest,
                                      self._model.b + 1.0)
         self._front = vehicle.front
 
@@ -296,7 +298,7 @@ class IdmPlanner(PathPlanner):
 
     def _longitudinal(self, request: PlanRequest, position: PathPosition, leaders: list[Leader],
                       end_s: float = math.inf) -> Longitudinal:
-        model, dt_s = self._model, request.time_step_s
+        model, dt_s, hardest = self._model, request.time_step_s, self._hardest
         front, middle = self._front, self._context.vehicle.rear_to_center
         halts = [min(self._driving.end_s, end_s)]
         line = self._stop_lines.halt_before(
@@ -333,7 +335,7 @@ class IdmPlanner(PathPlanner):
             wanted = min(wanted, max(bound, -2.0 * model.b))
             if speed < STANDING and wanted < START_SHARE * model.a:
                 return -speed / dt_s
-            return max(wanted, -model.b_max)
+            return max(wanted, -hardest)
 
         return acceleration
 

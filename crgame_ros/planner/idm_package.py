@@ -96,6 +96,7 @@ class IdmPackagePlanner(PathPlanner):
     def prepare(self, driving: DrivingPath, vehicle: VehicleParameters) -> None:
         """Compute the velocity profile of a new path and build the package's planner."""
         context = self._context
+        self._hardest = min(self._b_max, vehicle.max_acceleration)
         desired = desired_speeds(driving, self._v0, default_speed(context.planning_problem))
         profile = admissible_speeds(driving, desired, vehicle, LATERAL_ACCELERATION, self._b)
         # The package never stops at the end of a road by itself.
@@ -211,13 +212,13 @@ class IdmPackagePlanner(PathPlanner):
                 planner._compute_free_road_velocity_for_one_time_step(dt_s)
         except ZeroDivisionError:
             # The gap is exactly 0.
-            return -self._b_max
+            return -self._hardest
         end = cycle.state_list[-1]
         reached = (float(end.velocity) - speed) / dt_s
         substeps = int(dt_s / 0.01) + 1
         free = abs(reached * dt_s - float(end.acceleration) * substeps * 0.01) < 1e-6
         wanted = float(end.acceleration) if free else reached
-        return min(max(wanted, -self._b_max), self._a)
+        return min(max(wanted, -self._hardest), self._a)
 
 
 def _dynamic_obstacle(number: int, shape: Shape, k: int, poses: Array,

@@ -64,11 +64,14 @@ def admissible_speeds(driving: DrivingPath, desired: Array, vehicle: VehiclePara
     Return the desired speed, lowered for curves and for lower speeds ahead.
 
     :param desired: (N) [m/s]
+    :param vehicle: whose largest acceleration, less on a slippery road, limits the next two.
     :param lateral_acceleration: comfortable in curves [m/s^2]
     :param deceleration: towards a lower speed ahead [m/s^2]
     :return: (N) [m/s]
     """
     path = driving.path
+    lateral_acceleration = min(lateral_acceleration, vehicle.max_acceleration)
+    deceleration = min(deceleration, vehicle.max_acceleration)
     curvature = np.maximum(np.abs(path.curvature), 1e-6)
     slope = np.maximum(np.abs(np.gradient(path.curvature, path.step)), 1e-6)
     cos = 1.0 / np.hypot(1.0, vehicle.wheelbase * curvature)

@@ -17,7 +17,7 @@ def environment_of(scenario: Scenario, game: EnvironmentSpec | None) -> Environm
     CommonRoad's night is shown as dusk; of its weathers only fog is shown.
 
     :param game: the game's values; None for none
-    :return: values in which none is None
+    :return: with light and visibility, and the game's friction
     """
     location = scenario.location
     said = Environment() if location is None or location.environment is None \
@@ -25,4 +25,5 @@ def environment_of(scenario: Scenario, game: EnvironmentSpec | None) -> Environm
     game = EnvironmentSpec() if game is None else game
     return EnvironmentSpec(
         game.light or ('dusk' if said.time_of_day in _DARK else 'day'),
-        game.visibility or (FOG_M if said.weather is Weather.FOG else CLEAR_M))
+        game.visibility or (FOG_M if said.weather is Weather.FOG else CLEAR_M),
+        game.friction)

@@ -27,7 +27,12 @@ from crgame_ros.simulation.setup import AvSetup
 from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
 from crgame_ros.vehicle.state import VehicleState
-from crgame_ros.vehicle.stopping import braking_acceleration, moving_time, step_to_rest
+from crgame_ros.vehicle.stopping import (
+    braking_acceleration,
+    firm_braking,
+    moving_time,
+    step_to_rest,
+)
 import numpy as np
 from numpy.typing import NDArray
 import shapely
@@ -385,7 +390,7 @@ class AutonomousVehicle:
         state = self.state
         if state.speed == 0.0:
             return state._replace(acceleration=0.0, yaw_rate=0.0, steering_rate=0.0)
-        return self._held(braking_acceleration(state.speed))
+        return self._held(braking_acceleration(state.speed, firm_braking(self.setup.vehicle)))
 
 
 def _answers_nothing(stamp_ns: int) -> str:

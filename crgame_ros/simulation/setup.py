@@ -180,7 +180,7 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     loaded = load_scenario(game.scenario) if loaded is None else loaded
     network = RoadNetwork(loaded.scenario.lanelet_network)
     parts, remarks = assign_avs(game, loaded)
-    avs = _place_avs(parts, network)
+    avs = _place_avs(game, parts, network)
     k0 = min((av.planning_problem.initial_state.time_step for av in avs), default=0)
     doubles = _recorded_egos(loaded, avs, k0)
     obstacles = ScenarioObstacles(loaded, doubles, held_obstacles(game), put_obstacles(game))
@@ -205,7 +205,7 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
                        'count, and vehicles are bicycles unless the game names others')
     humans: list[DrivenHuman] = []
     for spec in game.humans:
-        parameters = load_vehicle_parameters(spec.vehicle, network.vehicle_type)
+        parameters = _vehicle(game, spec.vehicle, network)
         taken = [human.state for human in humans]
         state = place_human(
             network, spec, parameters, [av.state for av in avs], obstacles.descriptions,
@@ -297,15 +297,25 @@ def _discrepancies(avs: Iterable[AvSetup]) -> Iterable[str]:
                    '"spawn: problem" has no such gap')
 
 
-def _place_avs(parts: Sequence[Part], network: RoadNetwork) -> tuple[AvSetup, ...]:
+def _vehicle(game: Game, name: str, network: RoadNetwork) -> VehicleParameters:
+    parameters = load_vehicle_parameters(name, network.vehicle_type)
+    return parameters if game.environment is None \
+        else parameters.on_road(game.environment.friction)
+
+
+def _place_avs(game: Game, parts: Sequence[Part], network: RoadNetwork) -> tuple[AvSetup, ...]:
     avs: list[AvSetup] = []
     for spec, problem in parts:
-        parameters = load_vehicle_parameters(spec.vehicle, network.vehicle_type)
+        parameters = _vehicle(game, spec.vehicle, network)
         declared = problem_pose(problem, parameters.rear_to_center,
                                 parameters.wheelbase)
         state = declared
         if spec.spawn == 'lanelet':
             state = lanelet_pose(network, declared)
+        if spec.speed is not None:
+            state = state._replace(
+                speed=spec.speed, acceleration=0.0,
+                yaw_rate=spec.speed * math.tan(state.steering_angle) / parameters.wheelbase)
         transform = RigidTransform.between(state[:3], declared[:3])
         avs.append(AvSetup(spec, parameters, state, transform, problem))
     return tuple(avs)

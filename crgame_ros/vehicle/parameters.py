@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Vehicle parameters, read from `config/vehicles/`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import functools
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
@@ -130,6 +130,19 @@ class VehicleParameters:
     def rear(self) -> float:
         """Return the position of the rear bumper ahead of the rear axle, negative [m]."""
         return self.rear_to_center - 0.5 * self.length
+
+    def on_road(self, friction: float | None) -> 'VehicleParameters':
+        """
+        Return the vehicle on a road that grips less than its tyres could.
+
+        :param friction: peak friction of the road; None for one as good as the tyres [-]
+        """
+        if friction is None or 0.0 < self.friction <= friction:
+            return self
+        most = friction * self.gravity
+        return replace(self, friction=friction,
+                       max_acceleration=min(self.max_acceleration, most),
+                       max_brake_force=min(self.max_brake_force, self.mass * most))
 
 
 @functools.cache

@@ -6,6 +6,7 @@ import math
 from math import copysign
 
 from crgame_ros.vehicle.kinematic_single_track import integrate
+from crgame_ros.vehicle.parameters import VehicleParameters
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,6 +42,11 @@ class SpeedEnvelope:
 
 # Braking without a plan to follow [m/s^2]: firm, well within a dry road's friction.
 FIRM_BRAKING = 4.0
+
+
+def firm_braking(vehicle: VehicleParameters) -> float:
+    """Return the deceleration without a plan to follow, which a slippery road limits [m/s^2]."""
+    return min(FIRM_BRAKING, vehicle.max_acceleration)
 
 
 def braking_acceleration(speed: float, deceleration: float = FIRM_BRAKING) -> float:

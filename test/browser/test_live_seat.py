@@ -7,7 +7,6 @@ from itertools import count
 import signal
 
 from browser_support import Browser
-from crgame_ros.analysis.validation import validate
 from crgame_ros.launcher.run_plan import effective_setup, RunRequest
 from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.recorded_inputs import recorded_inputs
@@ -15,6 +14,7 @@ from crgame_ros.recording.recorded_states import recorded_states
 from crgame_ros.recording.run_folder import run_folders
 from crgame_ros.recording.run_record import read_drivers
 from crgame_ros.simulation.offline import run_offline
+from crgame_ros.verdict.validation import validate
 from live_browser_support import Graph, live_graph, LivePage, PATIENCE_S, SCENARIOS
 import numpy as np
 import pytest

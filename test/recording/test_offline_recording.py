@@ -13,7 +13,6 @@ import time
 
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.run_tables import tables_of
-from crgame_ros.analysis.validation import validate
 from crgame_ros.cli import main
 from crgame_ros.cockpit.replay_backend import ReplayBackend
 from crgame_ros.errors import CrgameError, InputError
@@ -41,6 +40,7 @@ from crgame_ros.recording.standard_messages import (
 from crgame_ros.ros.messages import to_joint_trajectory, to_time
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
+from crgame_ros.verdict.validation import validate
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import numpy as np
 import pytest

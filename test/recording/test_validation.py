@@ -56,17 +56,23 @@ def test_the_folder_of_a_run_is_all_its_files(run: Path,
         'recording', 'CommonRoad scenario', 'timing report'}
 
 
-def test_what_cannot_vary_in_a_game_is_told(tmp_path: Path,
-                                            capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(('given', 'wrong', 'words'), [
+    ('key: objects.b0.deceleration', 'key: objects.b7.deceleration',
+     "vary[2]: there is no entry 'b7'; there are b0"),
+    ('measure: collision', 'measure: colision',
+     "expect[0]: there is no measure 'colision'; did you mean collision or time_to_collision?")])
+def test_what_cannot_vary_or_be_expected_is_told(
+        given: str, wrong: str, words: str, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
     text = (scenarios_directory() / 'cut_in_family.yaml').read_text().replace(
         'scenario: ', f'scenario: {scenarios_directory()}/')
     file = tmp_path / 'game.yaml'
     file.write_text(text)
     assert _told(file, capsys)[0] == 0
-    file.write_text(text.replace('key: objects.b0.deceleration', 'key: objects.b7.deceleration'))
+    file.write_text(text.replace(given, wrong))
     code, out, err = _told(file, capsys)
     assert (code, out) == (2, f'{file}: game file, not valid\n')
-    assert "vary[2]: there is no entry 'b7'; there are b0" in err
+    assert words in err
 
 
 def test_all_that_is_wrong_with_a_game_is_told(tmp_path: Path,

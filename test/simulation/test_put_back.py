@@ -8,7 +8,6 @@ from pathlib import Path
 
 from crgame_ros.analysis.behaviour.lane_keeping import keep_lane
 from crgame_ros.analysis.scores.scored_run import score_run
-from crgame_ros.analysis.validation import validate
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import DrivabilitySpec, HumanSpec, PoseSpawn
@@ -25,6 +24,7 @@ from crgame_ros.simulation.setup import Setup
 from crgame_ros.simulation.stopped_drivers import PutBack
 from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.state import StateColumn, VehicleState
+from crgame_ros.verdict.validation import validate
 import numpy as np
 import pytest
 import shapely

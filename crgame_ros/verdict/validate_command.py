@@ -32,8 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def validate_files(values: argparse.Namespace) -> int:
     """Check each file, and print the verdict; faults go to stderr."""
-    from crgame_ros.analysis.validation import parts_of, validate
     from crgame_ros.recording.progress import Progress
+    from crgame_ros.verdict.validation import parts_of, validate
     code = 0
     paths = []
     for file in values.files:

@@ -233,9 +233,11 @@ def _yaml(path: Path, _progress: Progress | None) -> FileVerdict:
     faults = [str(error) for error in wrong]
     remarks: tuple[str, ...] = ()
     if file_kind.declared is Game and not faults:
+        from crgame_ros.evaluation.judging import check_expectations
         from crgame_ros.game.file import parse_game
         try:
             game = parse_game(values, str(path), path.parent)
+            check_expectations(game, str(path))
             remarks = build_setup(game).notices
             if game.vary:
                 space_of(write(game, game.base), str(path)).check(game.base, str(path))
