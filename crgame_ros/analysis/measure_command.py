@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""`crgame measure`: print how critical a recorded run was and how people drove, also as JSON."""
+"""`crgame measure`: print how critical a run was, rules, and how people drove, also as JSON."""
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
@@ -8,20 +8,25 @@ from functools import partial
 import json
 from pathlib import Path
 import sys
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from crgame_ros.analysis.criticality.thresholds import OPTIONS, Thresholds, USUAL
+
+if TYPE_CHECKING:
+    from crgame_ros.analysis.rules.vehicle_rules import VehicleRules
+    from crgame_ros.analysis.run_measures import RunMeasures
 
 # Printed after a value that is beyond its threshold.
 CRITICAL = '   <- critical'
 
 DESCRIPTION = """\
 Measure how critical a recorded run was: for each driven vehicle the worst moment of each measure,
-the time it spent below a threshold, and whose way it crossed. Then how people drove: lane keeping,
-steering reversals, pedals, reactions to events, gaps accepted, take-overs.
+the time it spent below a threshold, whose way it crossed, and the traffic rules that it broke.
+Then how people drove: lane keeping, steering reversals, pedals, reactions to events, gaps
+accepted, take-overs.
 
-Distances are bumper to bumper along the vehicle's own lane. docs/criticality.md and
-docs/behaviour.md define each.
+Distances are bumper to bumper along the vehicle's own lane. docs/criticality.md, docs/testing.md
+and docs/behaviour.md define each.
 
   crgame measure runs/NAME
   crgame measure runs/NAME --request take-over --json"""
@@ -63,7 +68,7 @@ def measure(values: argparse.Namespace) -> int:
     if values.json:
         print(json.dumps(found.as_dict(), indent=2))
     else:
-        lines = [*_lines(found.criticality.as_dict()),
+        lines = [*_lines(found),
                  *(line for each in found.behaviour if each.human or each.take_overs
                    for line in behaviour_lines(each)),
                  *(line for each in found.detection for line in detection_lines(each))]
@@ -71,10 +76,12 @@ def measure(values: argparse.Namespace) -> int:
     return 0
 
 
-def _lines(found: dict[str, Any]) -> Iterator[str]:
+def _lines(measured: 'RunMeasures') -> Iterator[str]:
     from crgame_ros.analysis.criticality.criticality import EXPOSURES, MEASURES
+    found: dict[str, Any] = measured.criticality.as_dict()
     limits = Thresholds(**found['thresholds'])
-    for vehicle_id, vehicle in found['vehicles'].items():
+    for (vehicle_id, vehicle), rules in zip(
+            found['vehicles'].items(), measured.rules, strict=True):
         yield vehicle_id
         near = {name: worst for name, worst in vehicle['worst'].items()
                 if MEASURES[name].matters(worst['value'])}
@@ -91,6 +98,20 @@ def _lines(found: dict[str, Any]) -> Iterator[str]:
             yield (f'  pet          {each["pet_s"]:9.2f} s      {each["second"]} after '
                    f'{each["first"]} at {each["entered_s"]:.1f} s'
                    f'{CRITICAL if limits.exceeded("pet", each["pet_s"]) else ""}')
+        yield from _rule_lines(rules)
+
+
+def _rule_lines(rules: 'VehicleRules') -> Iterator[str]:
+    """Yield the lines passed, and how long the safe distance was not kept, where it was so."""
+    from crgame_ros.analysis.rules.measures import MEASURES
+    for name, value in rules.values.items():
+        if value:
+            measure = MEASURES[name]
+            shown = f'{value:.0f}' if measure.is_count else f'{value:.2f}'
+            unit = 's' if measure.unit == 's' else ''
+            yield f'  {name:<21}{shown:>8} {unit:<6} {measure.label.lower()}'
+    for each in rules.passed:
+        yield f'  {each.kind} passed at {each.speed:.1f} m/s, lanelet {each.lanelet}'
 
 
 NEVER = '-'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The measures of `crgame measure`: how critical a run was, and how people drove."""
+"""The measures of `crgame measure`: how critical a run was, rules, and how people drove."""
 
 from collections.abc import Callable, Collection
 from typing import NamedTuple
@@ -11,6 +11,7 @@ from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
+from crgame_ros.analysis.rules.vehicle_rules import measure_rules, VehicleRules
 from crgame_ros.errors import InputError, short
 from crgame_ros.recording.run_record import RunRecord
 
@@ -20,17 +21,20 @@ class RunMeasures(NamedTuple):
     The measures of a run.
 
     :param criticality: criticality of all driven vehicles.
-    :param behaviour: how each driven vehicle was driven, in the log's order.
+    :param rules: how each driven vehicle kept traffic rules, in the log's order.
+    :param behaviour: how each was driven, likewise.
     :param detection: scores of each detection response task.
     """
 
     criticality: Criticality
+    rules: tuple[VehicleRules, ...]
     behaviour: tuple[DriverBehaviour, ...]
     detection: tuple[DetectionScore, ...] = ()
 
     def as_dict(self) -> dict[str, object]:
         """Return the dictionary that `crgame measure --json` writes."""
         return {**self.criticality.as_dict(),
+                'rules': {each.vehicle_id: each.as_dict() for each in self.rules},
                 'behaviour': {each.vehicle_id: each.as_dict() for each in self.behaviour},
                 **({'detection_response': [each.as_dict() for each in self.detection]}
                    if self.detection else {})}
@@ -53,7 +57,8 @@ def measure_run(record: RunRecord, thresholds: Thresholds = USUAL,
     """
     thresholds.check()
     check_requests(record, requests)
-    return RunMeasures(measure_log(record.log, thresholds, critical),
+    criticality = measure_log(record.log, thresholds, critical)
+    return RunMeasures(criticality, measure_rules(record, criticality),
                        measure_behaviour(record, requests=requests, progress=driven),
                        tuple(detection_scores(task_events(record))))
 

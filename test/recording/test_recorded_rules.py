@@ -7,6 +7,7 @@ from typing import Any
 
 from crgame_ros.analysis.report.outcome_section import outcome_section
 from crgame_ros.analysis.runs.run import Run
+from crgame_ros.cli import main
 from crgame_ros.evaluation.judging import check_expectations, shortfalls
 from crgame_ros.evaluation.results.cell_rows import vehicle_rows
 from crgame_ros.game.expectation import Expectation
@@ -57,7 +58,8 @@ def driven(game: Path) -> tuple[OfflineResult, dict[str, dict[str, object]]]:
     return result, {str(row['vehicle']): row for row in rows}
 
 
-def test_a_red_light_that_the_human_runs(tmp_path: Path, recorder: Any) -> None:
+def test_a_red_light_that_the_human_runs(tmp_path: Path, recorder: Any,
+                                         capsys: pytest.CaptureFixture[str]) -> None:
     """The IDM planner halts at its own; the recording says the same as the run."""
     result, rows = driven(lit(tmp_path))
     assert [rows[name]['red_lights_run'] for name in ('hv0', 'av0')] == [1, 0]
@@ -75,6 +77,11 @@ def test_a_red_light_that_the_human_runs(tmp_path: Path, recorder: Any) -> None:
     assert 16.0 < passed.k < 30.0
     html = outcome_section(recorded).html
     assert 'Red lights run' in html and 'red light' in html
+    capsys.readouterr()
+    assert main(['measure', str(tmp_path / 'run')]) == 0
+    said = capsys.readouterr().out
+    assert f'red_lights_run{1:>15}' in said
+    assert f'red light passed at {passed.speed:.1f} m/s, lanelet 31' in said
 
 
 @pytest.mark.parametrize(('human_red', 'sign', 'red', 'stop'), [(2, False, 0, 0),

@@ -26,6 +26,10 @@ class VehicleRules:
     values: Mapping[str, float | None]
     passed: tuple[PassedLine, ...]
 
+    def as_dict(self) -> dict[str, object]:
+        """Return the values by their names, and the lines that it passed."""
+        return {**self.values, 'passed': [each._asdict() for each in self.passed]}
+
 
 def measure_rules(record: RunRecord, criticality: Criticality) -> tuple[VehicleRules, ...]:
     """
