@@ -17,7 +17,7 @@ from crgame_ros.game.documents import document_entry, GameDocument
 from crgame_ros.game.driven_vehicle import DrivenVehicle
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import PerceptionSpec
-from crgame_ros.game.task_spec import TaskSpec
+from crgame_ros.game.task_spec import answer_key, TaskSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signs import stop_line_ends
@@ -223,12 +223,13 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
     :return: lengths in m, angles in rad, polylines as flat lists x0, y0, x1, y1, …
     """
     network = loaded.scenario.lanelet_network
+    air = environment_of(loaded.scenario, game.environment)
     document = {
         'id': game.scenario_sha256[:16], 'benchmark_id': loaded.benchmark_id,
         'title': game.title or loaded.benchmark_id,
         'bounds': _bounds(network, game),
         'country': str(loaded.scenario.scenario_id.country_id),
-        'environment': asdict(environment_of(loaded.scenario, game.environment)),
+        'environment': {'light': air.light, 'visibility': air.visibility},
         'lanelets': lanelet_entries(network, loaded.heights), 'gaps': gap_outlines(network),
         'stop_lines': stop_line_entries(network), 'lights': light_entries(network),
         'signs': sign_entries(network),
@@ -248,16 +249,17 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
         'occupancy': game.occupancy is not None,
         'events': [document_entry(event) for event in game.events], 'sound': game.sound,
         'contact': game.drivability.contact,
-        'tasks': [_task(task) for task in game.tasks], 'language': game.language}
+        'tasks': [_task(task, game.tasks) for task in game.tasks], 'language': game.language}
     finite: Document = _finite(document)
     return finite
 
 
-def _task(spec: TaskSpec) -> Document:
+def _task(spec: TaskSpec, tasks: Sequence[TaskSpec]) -> Document:
     task = spec.task
     return {'name': spec.name, 'kind': spec.kind, 'label': spec.label, 'seat': spec.seat,
             'shown_s': getattr(task, 'shown', None), 'latest_s': getattr(task, 'latest', None),
-            'lead_s': getattr(task, 'lead', None), 'show': getattr(task, 'show', True)}
+            'lead_s': getattr(task, 'lead', None), 'show': getattr(task, 'show', True),
+            'key': answer_key(spec, tasks), 'button': getattr(task, 'button', None)}
 
 
 def _vehicle(item: DrivenVehicle, role: str, perception: PerceptionSpec | None) -> Document:

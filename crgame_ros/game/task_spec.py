@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tasks of a game, which drivers answer or do besides driving."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
@@ -13,6 +14,12 @@ from crgame_ros.schema.marks import Advice, Keyed, LeftOut, Listed, Parts, Withi
 MAX_TASKS = 20
 _SEE = 'see docs/games.md for the keys'
 TaskKind = Literal['detection_response', 'take_over', 'secondary_task']
+# The key of an answer, and that of a request whose driver answers lights as well.
+ANSWER_KEY, SECOND_KEY = 'Enter', 'KeyT'
+# W, A, S, D, R, J and G drive.
+Key = Annotated[str, Wording('Enter|Key[BCEFHIK-QT-VX-Z]|Digit[0-9]|Numpad([0-9]|Enter)',
+                             'name a key that does not drive: Enter, KeyT, Digit1, Numpad0')]
+Button = Annotated[int, Within(0, 99)]
 
 
 @dataclass(frozen=True)
@@ -27,6 +34,9 @@ class DetectionResponse:
     :param earliest: an answer earlier than this time after the onset is premature [s]
     :param latest: an answer later than this time after the onset does not count, and the stimulus
         is missed [s]
+    :param key: that answers it, by its place on the keyboard.
+    :param button: of a gamepad or wheel that answers it, from 0; by default any that has no other
+        meaning, and the first such one if its driver may be asked to take over, too.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -36,6 +46,8 @@ class DetectionResponse:
     shown: Annotated[float, Within(0.05, 60.0)] = 1.0
     earliest: Annotated[float, Within(0.0, 10.0)] = 0.1
     latest: Annotated[float, Within(0.1, 60.0)] = 2.5
+    key: Key = ANSWER_KEY
+    button: Button | None = None
 
     def check(self) -> None:
         """Refuse overlapping stimuli, and times in the wrong order."""
@@ -59,6 +71,9 @@ class TakeOverPrompt:
         the time of that event; an event without a time is triggered `lead` after the request.
     :param shown: time after the lead at which the request disappears, if no driver takes over
         before [s]
+    :param key: that takes over; by default Enter, and T if its driver answers lights as well.
+    :param button: of a gamepad or wheel that takes over, from 0; by default any that has no other
+        meaning.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -66,6 +81,8 @@ class TakeOverPrompt:
     lead: Annotated[float, Within(0.0, 600.0)] = 5.0
     before: str | None = None
     shown: Annotated[float, Within(0.0, 600.0)] = 5.0
+    key: Key | None = None
+    button: Button | None = None
 
 
 @dataclass(frozen=True)
@@ -139,3 +156,17 @@ class TaskSpec:
 
 
 TaskList = Annotated[tuple[TaskSpec, ...], Listed(0, MAX_TASKS, 'task', 'name')]
+
+
+def answer_key(spec: TaskSpec, tasks: Sequence[TaskSpec]) -> str | None:
+    """
+    Return the key that answers a task; None for a task without an answer.
+
+    :param tasks: of the game, each with its seat.
+    """
+    task = spec.task
+    if isinstance(task, TakeOverPrompt):
+        lights = any(isinstance(each.task, DetectionResponse) and each.seat == spec.seat
+                     for each in tasks)
+        return task.key or (SECOND_KEY if lights else ANSWER_KEY)
+    return task.key if isinstance(task, DetectionResponse) else None

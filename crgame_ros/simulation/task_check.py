@@ -3,10 +3,17 @@
 """Checks of a game's tasks against its vehicles, objects and events."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import AtTime, Between, EventSpec, Near
-from crgame_ros.game.task_spec import OnEvent, TakeOverPrompt, TaskSpec
+from crgame_ros.game.task_spec import (
+    answer_key,
+    DetectionResponse,
+    OnEvent,
+    TakeOverPrompt,
+    TaskSpec,
+)
 
 
 def task_seat(spec: TaskSpec, vehicles: Sequence[str]) -> str:
@@ -25,6 +32,7 @@ def check_tasks(tasks: Sequence[TaskSpec], events: Sequence[EventSpec], where: s
     :raises InputError: naming the task and the available names.
     """
     by_name = {event.name: event for event in events}
+    seated = [replace(spec, seat=spec.seat or next(iter(vehicles), None)) for spec in tasks]
     for spec in tasks:
         place = f'{where}: task {spec.name}'
         if spec.name in by_name:
@@ -47,6 +55,23 @@ def check_tasks(tasks: Sequence[TaskSpec], events: Sequence[EventSpec], where: s
         if isinstance(spec.task, TakeOverPrompt) and spec.task.before is not None:
             _check_event(spec.task.before, by_name, place)
             _check_lead(spec, spec.task, by_name[spec.task.before], place)
+    _check_answers(seated, where)
+
+
+def _check_answers(tasks: Sequence[TaskSpec], where: str) -> None:
+    """Refuse a light and a request for one driver that have the same key or button."""
+    for light in tasks:
+        for request in tasks:
+            if not isinstance(light.task, DetectionResponse) or light.seat != request.seat \
+                    or not isinstance(request.task, TakeOverPrompt):
+                continue
+            place = f'{where}: tasks {light.name} and {request.name}'
+            if answer_key(request, tasks) == light.task.key:
+                raise InputError(f'both are answered by {light.task.key}', place,
+                                 'give one of them another "key"')
+            if light.task.button is not None and light.task.button == request.task.button:
+                raise InputError(f'both are answered by button {light.task.button}', place,
+                                 'give one of them another "button"')
 
 
 def _check_event(name: str, events: dict[str, EventSpec], place: str) -> None:

@@ -64,14 +64,20 @@ def trial_game(settings: TrialSettings, driver: str) -> Game:
 
 
 def _seated(settings: TrialSettings, driver: str, game: Game) -> Game:
-    """Return the game with its driver in the participant's vehicle, the only driver."""
+    """Return the game with its driver and tasks in the participant's vehicle, the only driver."""
     seat = seat_of(settings, game)
     for human in game.humans:
         if human.id != seat and human.driver == COCKPIT:
             raise InputError(f'{human.id} waits for a second person', settings.game or 'trial',
                              'give it another driver, such as idle, or take it out of the game')
-    return replace(game, humans=tuple(
-        replace(human, driver=driver) if human.id == seat else human for human in game.humans))
+    for task in game.tasks:
+        if task.seat not in (None, seat):
+            raise InputError(f'task {task.name} is for {task.seat}, and the participant sits in '
+                             f'{seat}', settings.game or 'trial', 'leave out its "seat"')
+    return replace(
+        game, tasks=tuple(replace(task, seat=seat) for task in game.tasks),
+        humans=tuple(replace(human, driver=driver) if human.id == seat else human
+                     for human in game.humans))
 
 
 def _written_game(settings: TrialSettings) -> Game:

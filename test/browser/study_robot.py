@@ -50,8 +50,8 @@ return document.body.dataset.show === 'drive' && state && state.run === 'running
 """
 
 
-# Steering, and the answer to a light that may be on.
-_TOUCHED = (Keys.ARROW_RIGHT, Keys.ENTER, Keys.ARROW_LEFT)
+# Steering, and the answers to a light and to a request that may be there.
+_TOUCHED = (Keys.ARROW_RIGHT, Keys.ENTER, 't', Keys.ARROW_LEFT)
 
 
 class Page(Protocol):

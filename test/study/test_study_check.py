@@ -7,6 +7,7 @@ from typing import Any
 
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
+from crgame_ros.game.task_spec import answer_key
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.schema.reading import read
 from crgame_ros.study.check import check_study, length_of
@@ -68,10 +69,26 @@ def test_settings_cascade(tmp_path: Path) -> None:
     assert (game.duration, game.seed, game.humans[0].driver) == (1.0, 4, 'idle')
 
 
+def test_tasks_are_for_the_seat_of_the_participant(tmp_path: Path) -> None:
+    """Who rides in an AV and has lights takes over by another key."""
+    study = study_of(tmp_path, settings={'game': CUT_IN, 'duration': 2, 'seat': 'av0', 'tasks': [
+        {'name': 'drt', 'detection_response': {}}, {'name': 'over', 'take_over': {}}]})
+    tasks = trial_game(conditions_of(study, study.blocks[0])[0].settings, 'idle').tasks
+    assert [(task.seat, answer_key(task, tasks)) for task in tasks] == [
+        ('av0', 'Enter'), ('av0', 'KeyT')]
+    assert answer_key(tasks[1], tasks[1:]) == 'Enter'
+
+
 @pytest.mark.parametrize(('changed', 'message'), [
     ({'settings': {'duration': 2}}, 'names no game'),
     ({'settings': {'game': 'nowhere.yaml'}}, 'nowhere.yaml'),
     ({'settings': {'game': CUT_IN, 'seat': 'hv7'}}, 'has no human or AV "hv7"'),
+    ({'settings': {'game': CUT_IN, 'duration': 2, 'seat': 'av0', 'tasks': [
+        {'name': 'drt', 'seat': 'hv0', 'detection_response': {}}]}},
+     'task drt is for hv0, and the participant sits in av0; leave out its "seat"'),
+    ({'settings': {'game': CUT_IN, 'duration': 2, 'tasks': [
+        {'name': 'drt', 'detection_response': {}}, {'name': 'over', 'take_over': {'key': 'Enter'}}
+        ]}}, 'tasks drt and over: both are answered by Enter'),
     ({'settings': {'game': CUT_IN, 'duration': 2, 'planner': 'idm', 'options': {'x': 1}},
       'factors': [{'name': 'f', 'levels': [{'name': 'a'}, {'name': 'b'}]}]}, '"x" is unknown'),
     ({'before': [{'page': 'absent.md'}]}, 'there is no such page'),

@@ -31,11 +31,13 @@ class TaskEvent(NamedTuple):
         for a request, until the first input with hands or pedals [s]
     :param outcome: for a stimulus hit, premature, missed, unseen (no page showed it) or open (run
         or task ended before it was over); unrequested for an answer without a stimulus; for a
-        request taken or none; for a span begun.
+        request taken (an input came), seated (a person took the vehicle, without an input), unseen
+        or none (it was shown, and nothing of both came); for a span begun.
     :param value: number of the stimulus or request, from 1; 0 for anything else.
     :param seat: the vehicle whose driver it was for.
     :param what: stimulus, unrequested, request or span (from beginning to end of a task).
     :param times: times that the page measured.
+    :param answered_s: for a request, until a person had the seat of the AV [s]
     """
 
     kind: TaskKind
@@ -48,6 +50,7 @@ class TaskEvent(NamedTuple):
     seat: str = ''
     what: str = ''
     times: PageTimes = NOT_MEASURED
+    answered_s: float = math.nan
 
 
 def task_events(run: RunRecord) -> list[TaskEvent]:
@@ -76,9 +79,12 @@ def _row(run: RunRecord, entry: TaskEntry, later: Sequence[TaskEntry], dt_s: flo
     duration_s = (last_s if closed is None else closed.n * dt_s) - onset_s
     if entry.what == 'request':
         reaction_s = first_input(run, entry.seat, onset_s)
-        return TaskEvent(entry.kind, entry.task, onset_s, duration_s, reaction_s,
-                         'none' if math.isnan(reaction_s) else 'taken', entry.number, entry.seat,
-                         'request', shown)
+        seated = closed is not None and closed.by == 'driven'
+        outcome = 'taken' if not math.isnan(reaction_s) else 'seated' if seated else 'none' \
+            if any(each.what == 'shown' for each in of_it) else 'unseen'
+        return TaskEvent(entry.kind, entry.task, onset_s, duration_s, reaction_s, outcome,
+                         entry.number, entry.seat, 'request', shown,
+                         duration_s if seated else math.nan)
     if closed is None or closed.what == 'over':
         return TaskEvent(entry.kind, entry.task, onset_s, duration_s, math.nan, 'open',
                          entry.number, entry.seat, 'stimulus', shown)

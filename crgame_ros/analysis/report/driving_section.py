@@ -107,7 +107,8 @@ def task_section(run: Run) -> Section | None:
                 'task', 'driver', 'hits', 'misses', 'premature', 'unrequested', 'hit rate',
                 'response time, mean [s]', 'standard deviation [s]', 'median [s]')),
             (_requests(run, events), 'Requests to take over', (
-                'task', 'vehicle', 'at [s]', 'seen after [ms]', 'first input after [s]')),
+                'task', 'vehicle', 'at [s]', 'seen after [ms]', 'seat taken after [s]',
+                'first input after [s]', 'outcome')),
             (_spans(run, events), 'What lasted', ('task', 'driver', 'from [s]', 'for [s]'))):
         told = list(rows)
         if told:
@@ -127,7 +128,8 @@ def _requests(run: Run, events: Sequence[TaskEvent]) -> Iterator[Sequence[str]]:
     for event in events:
         if event.what == 'request':
             yield (free(event.name), named(run, event.seat), moment(run, event.onset_s),
-                   number(event.times.delay_ms, 0), number(event.response_time_s))
+                   number(event.times.delay_ms, 0), number(event.answered_s),
+                   number(event.response_time_s), event.outcome)
 
 
 def _spans(run: Run, events: Sequence[TaskEvent]) -> Iterator[Sequence[str]]:

@@ -99,7 +99,11 @@ TAKE_OVER_REQUESTS = TableDeclaration(
      Column('first_input_s', NUMBER, 's', 'from the onset to the first input', 'consumed command',
             'of an AV hands on, as in take_overs; of a vehicle that is driven by hand already the '
             'first response of reactions', 'there was none'),
-     Column('outcome', TEXT, '', 'whether there was a first input', values=('taken', 'none'))))
+     Column('answered_s', NUMBER, 's', 'from the onset until a person had the seat of the AV',
+            empty='nobody took it, or the vehicle is driven by hand already'),
+     Column('outcome', TEXT, '', 'taken: there was a first input; seated: a person took the AV, '
+            'but no input came; none: it was shown, and nothing of both came',
+            values=('taken', 'seated', 'none', 'unseen'))))
 TASK_SPANS = TableDeclaration(
     'task_spans', 'a stretch in which a task lasted', ('run', 'task', 'time_s'),
     (RUN, _TASK, _VEHICLE,
@@ -135,12 +139,16 @@ def _responses(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:
                    'paused_ms': event.times.paused_ms}
 
 
+def _known(seconds: float) -> float | None:
+    return None if math.isnan(seconds) else seconds
+
+
 def _requests(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:
     for event in events:
         if event.what == 'request':
-            first_s = event.response_time_s
             yield {**_common(event), 'duration_s': event.duration_s,
-                   'first_input_s': None if math.isnan(first_s) else first_s}
+                   'first_input_s': _known(event.response_time_s),
+                   'answered_s': _known(event.answered_s)}
 
 
 def _spans(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:

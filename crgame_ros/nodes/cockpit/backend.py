@@ -270,9 +270,12 @@ class LiveBackend:
 
     def _report_task(self, client: Client, message: TaskDone) -> str:
         """Pass on what the page of a seat has shown, or what its driver has answered."""
-        seat, what = message.seat, message.what
-        # A take-over request is shown before any client has the seat.
-        if what != 'shown' or seat in self._desk.table.held or not client.rights.drives:
+        seat, what, scenario = message.seat, message.what, self._feed.scenario
+        free = seat not in self._desk.table.held and client.rights.drives
+        # Who rides in an AV answers its lights; a request is shown before anybody has the seat.
+        rides = scenario is not None and scenario.game.av(seat) is not None \
+            and client.rights.seat in ('', seat)
+        if not free or not (rides or what == 'shown'):
             self._desk.table.holding(client.id, seat)
         self._orders.report_task(TaskReport(
             seat, message.task, message.number, what, message.times))

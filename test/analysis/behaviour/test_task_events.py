@@ -145,6 +145,8 @@ def test_a_request_is_timed_until_the_first_input(record: RunRecord) -> None:
     assert rows['robot'].response_time_s == pytest.approx(1.5, abs=0.02)
     # The request ends as soon as the AV is driven by hand; else after lead and 5 s more.
     assert rows['robot'].duration_s == pytest.approx(1.01, abs=0.011)
+    assert rows['robot'].answered_s == rows['robot'].duration_s
+    assert math.isnan(rows['call'].answered_s)
     assert rows['call'].duration_s == pytest.approx(8.0)
     radio = next(row for row in task_events(record) if row.name == 'radio')
     assert (radio.onset_s, radio.duration_s) == pytest.approx((1.0, 3.0))

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The inputs by which a driver answers: Enter, a free button of gamepad or wheel, touch. */
+/** The inputs by which a driver answers: a key and a button for each kind of task, touch. */
 
 import { isTyping } from '../driving/focus.js';
 import { connectedPads } from '../driving/gamepad.js';
@@ -8,7 +8,13 @@ import { LIGHT_BUTTONS } from '../lights.js';
 
 import type { Profile } from '../driving/gamepad_profile.js';
 
-export const ANSWER_KEY = 'Enter';
+/** What can be answered: a light, or a request to take over. */
+export type Answered = 'light' | 'request';
+/** The inputs of one of them; `button` is null for the usual ones. */
+export interface AnswerInput { key: string; button: number | null }
+/** The inputs of a page's driver; without lights or requests, those are missing. */
+export type AnswerInputs = Partial<Record<Answered, AnswerInput>>;
+
 // An older time stamp of a gamepad does not belong to the press just seen [ms].
 const FRESH_MS = 200;
 
@@ -26,29 +32,64 @@ export function isTaken(profile: Profile, index: number): boolean {
       (control) => control.kind === 'button' && control.index === index);
 }
 
+/**
+ * Return what a button answers. By default any free button answers a request, and any a light; a
+ * driver who may get both answers lights by the first free one.
+ *
+ * @param profile of its device
+ * @param index of the button
+ * @returns null for nothing
+ */
+export function answeredBy(inputs: AnswerInputs, profile: Profile, index: number):
+    Answered | null {
+  if (isTaken(profile, index)) {
+    return null;
+  }
+  const { light, request } = inputs;
+  const first = [...Array(index + 1).keys()].find((each) => !isTaken(profile, each)
+    && each !== request?.button);
+  const forLight = light !== undefined && (light.button === null
+    ? (request === undefined || index === first) && index !== request?.button
+    : index === light.button);
+  if (forLight) {
+    return 'light';
+  }
+  return request !== undefined && (request.button === null || request.button === index)
+    ? 'request' : null;
+}
+
+/** @returns a key's name for people: `T` for KeyT */
+export function keyName(key: string): string {
+  return key.replace(/^(Key|Digit)/, '').replace(/^Numpad(?=.)/, 'Numpad ');
+}
+
 /** A listener that is active while answers are accepted. */
 export class Answers {
+  #inputs;
   #wanted;
   #take;
   #pressed = new Map<number, boolean[]>();
   #polling = false;
 
   /**
+   * @param inputs returns what the driver may have to answer in this run
    * @param wanted returns whether an answer is accepted now
-   * @param take called with the time of an answer, by performance.now
+   * @param take called with what is answered, and when, by performance.now
    */
-  constructor(wanted: () => boolean, take: (at_ms: number) => void) {
+  constructor(inputs: () => AnswerInputs, wanted: (what: Answered) => boolean,
+    take: (what: Answered, at_ms: number) => void) {
+    this.#inputs = inputs;
     this.#wanted = wanted;
     this.#take = take;
     window.addEventListener('keydown', (event) => this.#key(event), true);
   }
 
-  /** Accept a touch or click on an element as an answer. */
+  /** Accept a touch or click on an element as the answer to a light. */
   touch(node: HTMLElement) {
     node.addEventListener('pointerdown', (event) => {
-      if (this.#wanted()) {
+      if (this.#wanted('light')) {
         event.preventDefault();
-        this.#take(event.timeStamp);
+        this.#take('light', event.timeStamp);
       }
     });
   }
@@ -62,21 +103,29 @@ export class Answers {
     }
   }
 
+  get #any() {
+    return this.#wanted('light') || this.#wanted('request');
+  }
+
   #key(event: KeyboardEvent) {
     const free = !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping(event.target)
       && !document.querySelector('dialog[open]');
-    if (event.key === ANSWER_KEY && free && this.#wanted()) {
+    const inputs = this.#inputs();
+    const what = (['light', 'request'] as const).find((each) => inputs[each]?.key === event.code
+      || (inputs[each]?.key === 'Enter' && event.key === 'Enter'));
+    if (free && what !== undefined && this.#wanted(what)) {
       event.preventDefault();
       event.stopPropagation();
       if (!event.repeat) {
-        this.#take(event.timeStamp);
+        this.#take(what, event.timeStamp);
       }
     }
   }
 
   #poll() {
-    this.#polling = this.#wanted();
+    this.#polling = this.#any;
     const now_ms = performance.now();
+    const inputs = this.#inputs();
     for (const pad of connectedPads()) {
       const device = window.crgame.driving?.gamepads.devices.find(
         ({ index }) => index === pad.index);
@@ -84,11 +133,17 @@ export class Answers {
       const pressed = pad.buttons.map((button) => button.pressed);
       this.#pressed.set(pad.index, pressed);
       // The first poll cannot tell which buttons are newly pressed.
-      const fresh = before !== undefined && device !== undefined && pressed.some(
-        (down, i) => down && !before[i] && !isTaken(device.profile, i));
-      if (fresh && this.#polling) {
-        const age_ms = now_ms - pad.timestamp;
-        this.#take(age_ms >= 0 && age_ms < FRESH_MS ? pad.timestamp : now_ms);
+      if (before === undefined || device === undefined) {
+        continue;
+      }
+      const age_ms = now_ms - pad.timestamp;
+      const at_ms = age_ms >= 0 && age_ms < FRESH_MS ? pad.timestamp : now_ms;
+      const answered = pressed.map((down, i) => (down && !before[i]
+        ? answeredBy(inputs, device.profile, i) : null));
+      for (const what of ['light', 'request'] as const) {
+        if (answered.includes(what) && this.#wanted(what)) {
+          this.#take(what, at_ms);
+        }
       }
     }
     if (this.#polling) {

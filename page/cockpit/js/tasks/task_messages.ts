@@ -17,6 +17,8 @@ export interface GameTask {
   latest_s: number | null; // until when a stimulus can be answered
   lead_s: number | null; // of a request
   show: boolean; // whether the driver reads the label
+  key: string | null; // place of the key that answers it; null for a secondary task
+  button: number | null; // of a gamepad or wheel; null for the usual ones
 }
 
 /** A stimulus or request that is neither answered nor over. */

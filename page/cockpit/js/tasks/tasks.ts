@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The tasks of the driver at this page: their view, and answers timed by the page's clock. */
 
-import { Answers, ANSWER_KEY } from './answers.js';
+import { Answers, keyName } from './answers.js';
 import { inPicture, Prompt } from './prompt.js';
 import { RequestTone } from './request_tone.js';
 import { RunningTime } from './running_time.js';
@@ -11,6 +11,7 @@ import { TaskView } from './task_view.js';
 
 import type { Connection } from '../connection.js';
 import type { Store } from '../store.js';
+import type { Answered, AnswerInputs } from './answers.js';
 import type { GameTask, OpenPrompt, PageTimes } from './task_messages.js';
 
 /** The tasks of a page; in `window.crgame.tasks`. */
@@ -30,7 +31,8 @@ export class Tasks {
     this.#store = store;
     this.#connection = connection;
     this.#view = new TaskView(stage);
-    this.#answers = new Answers(() => this.#wanted, (at_ms) => this.#answer(at_ms));
+    this.#answers = new Answers(() => this.#inputs, (what) => this.#accepts(what),
+      (what, at_ms) => this.#answer(what, at_ms));
     this.#answers.touch(this.#view.answerButton);
     this.#answers.touch(this.#view.light);
     this.#view.takeButton.addEventListener('click', () => this.#takeOver());
@@ -55,16 +57,40 @@ export class Tasks {
     return this.#store.connected && this.#store.status?.run === 'running';
   }
 
-  /** Return whether an answer is accepted: this driver's detection task and the run are active. */
+  /** Return whether an answer is accepted: the run goes on, and a task of this driver asks. */
+  #accepts(what: Answered) {
+    return this.#runs && (what === 'light' ? this.#detecting !== undefined
+      : this.#request?.free === true);
+  }
+
   get #wanted() {
-    return this.#runs && (this.#detecting !== undefined || this.#request?.free === true);
+    return this.#accepts('light') || this.#accepts('request');
+  }
+
+  /** @returns the inputs for the tasks that this page's driver may get in this run */
+  get #inputs(): AnswerInputs {
+    const tasks = this.#store.scene?.tasks ?? [];
+    const light = this.#mine.find(({ kind }) => kind === 'detection_response');
+    const seat = light?.seat ?? this.#request?.prompt.task.seat;
+    const request = tasks.find((task) => task.kind === 'take_over' && task.seat === seat);
+    const input = (task: GameTask | undefined) => (task?.key ? { key: task.key,
+      button: task.button } : undefined);
+    return { light: input(light), request: input(request) };
   }
 
   /** @returns the tasks of the game for this page's driver */
   get #mine(): GameTask[] {
     const { mode, scene, seats, me } = this.#store;
-    return mode !== 'live' || me.id === '' ? []
-      : (scene?.tasks ?? []).filter(({ seat }) => seats[seat]?.holder === me.id);
+    return mode !== 'live' || me.id === '' ? [] : (scene?.tasks ?? []).filter(
+      ({ seat }) => seats[seat]?.holder === me.id || this.#rides(seat));
+  }
+
+  /** Return whether the person at this page rides in an AV that its planner drives. */
+  #rides(seat: string) {
+    const { seats, scene, rights } = this.#store;
+    const own = window.crgame.stage?.address.seat ?? rights.seat;
+    return own === seat && rights.drives && seats[seat] !== undefined && !seats[seat].holder
+      && scene?.vehicles.find(({ id }) => id === seat)?.role === 'autonomous';
   }
 
   /** @returns this driver's active detection task */
@@ -197,15 +223,14 @@ export class Tasks {
     const { task } = request.prompt;
     this.#view.showRequest({
       label: task.label, free: request.free,
-      hint: request.free ? this.#words.takeOverHint.replace('{key}', ANSWER_KEY)
+      hint: request.free ? this.#words.takeOverHint.replace('{key}', keyName(task.key ?? ''))
         : this.#words.hold,
     });
   }
 
   /** @param at_ms time of the answer */
-  #answer(at_ms: number) {
-    const request = this.#request;
-    if (request?.free) {
+  #answer(what: Answered, at_ms: number) {
+    if (what === 'request') {
       this.#takeOver();
       return;
     }
