@@ -99,7 +99,7 @@ def finished(folder: Path) -> dict[str, dict[str, Any]]:
     return {entry['item']: entry for entry in entries}
 
 
-# Stands for the cockpit's stage: it reports that it is seated and keeps received messages.
+# Stands for the cockpit's stage: it is seated, draws later, and keeps received messages.
 STAGE = """<!DOCTYPE html><title>stage</title><input id="wheel"><script>
 window.heard = [];
 window.began = Math.random();
@@ -107,8 +107,10 @@ addEventListener('message', ({ data, origin }) => {
   heard.push({ ...data, origin });
   if (data.kind === 'focus') { document.getElementById('wheel').focus(); }
 });
-setTimeout(() => parent.postMessage({ crgame: 1, kind: 'stage', state: {
-  seat: 'hv0', seated: true, connected: true, input_delay_ms: 33.4 } }, '*'), 300);
+const tell = (drawn) => parent.postMessage({ crgame: 1, kind: 'stage', state: {
+  seat: 'hv0', seated: true, connected: true, input_delay_ms: 33.4, drawn } }, '*');
+setTimeout(() => tell(false), 100);
+setTimeout(() => { window.drew = performance.timeOrigin + performance.now(); tell(true); }, 900);
 </script>"""
 
 

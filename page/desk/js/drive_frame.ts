@@ -75,8 +75,8 @@ export class DriveFrame {
   #showGate() {
     const ready = this.#phase === 'ready';
     // Without a stage the page does not wait.
-    const { seated, rides, connected } = this.#state;
-    const loaded = this.#link === '' || Boolean((seated || rides) && connected);
+    const { seated, rides, connected, drawn } = this.#state;
+    const loaded = this.#link === '' || Boolean((seated || rides) && connected && drawn);
     const was = this.#button.disabled;
     this.#gate.hidden = !ready;
     setText(this.#button, this.#words.of('ready'));
@@ -84,7 +84,7 @@ export class DriveFrame {
     setAttribute(this.#button, 'disabled', !loaded);
     if (this.#frame) {
       this.#frame.inert = ready;
-      // Before it has a seat, the stage shows parts of an incomplete page.
+      // Before it has a seat and its first picture, the stage shows parts of an incomplete page.
       this.#frame.classList.toggle('loads', ready && !loaded);
     }
     if (ready && was && loaded) {

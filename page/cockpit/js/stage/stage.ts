@@ -33,6 +33,8 @@ export class Stage {
   #refusal = '';
   #failed = '';
   #missing3d = false;
+  // Pictures of the view before the present epoch; NaN until the address is applied.
+  #before = NaN;
   // Epoch for which the driver has reported ready.
   #ready = { wanted: false, epoch: -1, sent: false };
 
@@ -54,6 +56,7 @@ export class Stage {
       this.#role = '';
       this.#claimRole();
     });
+    store.on('epoch', () => { this.#before = this.#begun ? this.#pictures : NaN; });
     store.on('seats', () => this.#update());
     store.on('connection', () => this.#update());
     this.#claimRole();
@@ -77,7 +80,21 @@ export class Stage {
         this.#missing3d = !await view3d.show(true);
       }
     }
+    // Until now, the page showed nothing: neither the map nor what the address hides.
+    document.documentElement.dataset.begun = '';
+    this.#before = this.#pictures;
+    world.redraw();
     this.#update();
+  }
+
+  get #begun() {
+    return !Number.isNaN(this.#before);
+  }
+
+  /** @returns number of pictures that the view has drawn */
+  get #pictures(): number {
+    const { view3d, world } = window.crgame;
+    return view3d?.on ? view3d.stats?.frames ?? 0 : world.stats.frames;
   }
 
   #writeLabels() {
@@ -242,7 +259,8 @@ export class Stage {
       reason: status?.run === 'ended' ? status.reason ?? '' : '', epoch, time_s,
       ready: this.#seated && Boolean(seats[seat]?.ready),
       countdown_s: connected ? status?.countdown_s ?? 0 : 0,
-      view: this.#view, missing3d: this.#missing3d, sound: this.#sound,
+      view: this.#view, drawn: this.#begun && this.#pictures > this.#before,
+      missing3d: this.#missing3d, sound: this.#sound,
       hasInput: this.#seated && driving?.away === null, away: driving?.away ?? '',
       device: driving?.device ?? '',
       delay_ms: Number.isFinite(round_trip_ms) ? Math.round(round_trip_ms) : null,

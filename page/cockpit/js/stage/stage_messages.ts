@@ -23,6 +23,7 @@ export interface StageState {
   ready: boolean; // whether the simulation counts the driver as ready
   countdown_s: number; // until the run begins; 0 for none
   view: StageView; // what is shown
+  drawn: boolean; // whether this view has drawn a picture of the present run
   missing3d: boolean; // whether the map is shown because the 3D view is not available
   // `waits` for a key, a click or a gamepad's button; `none` in the game
   sound: 'on' | 'waits' | 'off' | 'none';
