@@ -256,6 +256,9 @@ class SeenView(Message):
     :param rate_hz: pictures per second; None before the first count.
     :param renderer: name of the renderer as the browser reports it; empty on the map.
     :param software: whether the processor renders.
+    :param away: why the driver's inputs have no effect: focus, hidden, …; empty while they have.
+    :param full_screen: whether the page fills the screen.
+    :param stage: the seat that a stage is for; empty for other pages.
     """
 
     type: Literal['view'] = 'view'  # noqa: A003
@@ -273,6 +276,9 @@ class SeenView(Message):
     eye_distance_m: Annotated[float, Field(ge=0.0, le=20.0)] | None = None
     rate_hz: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
     renderer: Annotated[str, BeforeValidator(partial(_cleaned, length=MAX_RENDERER))] = ''
+    away: Annotated[str, StringConstraints(pattern='^[a-z]{0,20}$')] = ''
+    full_screen: Flag = False
+    stage: VehicleId | Literal[''] = ''
 
 
 class Ping(Message):

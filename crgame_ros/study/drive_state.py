@@ -34,6 +34,7 @@ class DriveState:
     :param link: address of the cockpit's page for the participant; empty if not available.
     :param time_s: the run's clock [s]; None before the first cycle.
     :param text: for the experimenter: the present work, or the failure.
+    :param doubts: what of the drive's data is beyond a bound of the study so far.
     """
 
     phase: DrivePhase = DrivePhase.NONE
@@ -42,3 +43,4 @@ class DriveState:
     link: str = ''
     time_s: float | None = None
     text: str = ''
+    doubts: tuple[str, ...] = ()

@@ -12,6 +12,7 @@ from crgame_ros.schema.marks import Folder, Keyed, Listed, Within, Wording
 from crgame_ros.schema.reading import read
 from crgame_ros.study.local_text import LocalText, Text
 from crgame_ros.study.names import Name
+from crgame_ros.study.quality import QualityBounds
 from crgame_ros.study.question import Question
 from crgame_ros.study.trial_order import OrderKind
 from crgame_ros.study.trial_settings import Factor, NOTHING, TrialSettings
@@ -171,6 +172,7 @@ class StudyFile:
     :param participants: planned number, for the checks of balance.
     :param fields: questions to each participant at the start.
     :param markers: that the experimenter can set by a key during a session.
+    :param quality: the bounds of data that hold, and what happens beyond them.
     :param settings: of all trials.
     :param factors: the factors of the experiment.
     :param before: steps before the first block.
@@ -190,6 +192,7 @@ class StudyFile:
     participants: Annotated[int, Within(1, 10_000)] = 12
     fields: Annotated[tuple[Question, ...], Listed(0, 50, 'question', 'name')] = ()
     markers: Annotated[tuple[str, ...], Listed(0, 9, 'marker')] = ('marker',)
+    quality: QualityBounds = QualityBounds()
     settings: TrialSettings = NOTHING
     factors: Annotated[tuple[Factor, ...], Listed(0, 10, 'factor', 'name')] = ()
     before: Steps = ()

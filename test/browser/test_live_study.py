@@ -133,6 +133,16 @@ def test_a_passenger_sees_the_lights_of_the_av(conducted: StudySession) -> None:
         assert float(light['time_s']) < 3.0 and light['text'] in ('hit', 'premature', 'missed')
 
 
+def test_a_drive_says_whether_its_data_hold(conducted: StudySession) -> None:
+    """Every light was shown, and the page kept the focus, also while an AV drove itself."""
+    folder = conducted.folder.parents[1] / 'data'
+    for row, least in zip(table(folder / 'trials.csv'), (2, 0, 2, 2), strict=True):
+        assert int(row['stimuli']) >= least
+        assert (row['unseen_stimuli'], row['away_s'], row['device_changes']) == ('0', '0.0', '0')
+        assert float(row['view_rate_hz']) > 0.0
+        assert row['page_flag'] == ('true' if row['page_reason'] else 'false')
+
+
 def test_a_finished_participant_is_not_asked_again(conducted: StudySession) -> None:
     before = len(read_journal(conducted.folder))
     done = subprocess.run(conducted.command, capture_output=True, text=True, timeout=PATIENCE_S)

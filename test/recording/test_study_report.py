@@ -8,7 +8,7 @@ import re
 
 from crgame_ros.cli import main
 from crgame_ros.study.data.condition_section import within_halves
-from crgame_ros.study.data.timing_quality import BOUNDS, timing_faults
+from crgame_ros.study.quality import PAGE, QualityBounds, TIMING
 from crgame_ros.study.session_journal import JOURNAL, SessionJournal
 import numpy as np
 import polars
@@ -75,16 +75,17 @@ def test_timing_beyond_a_bound_is_marked_and_named(copied: Path) -> None:
     journal = copied / 'participants' / 'P02' / JOURNAL
     assert main(['study', 'data', str(copied)]) == 0
     row = polars.read_parquet(copied / 'data' / 'trials.parquet').row(0, named=True)
-    assert timing_faults(row) == [] and journal.exists()
+    bounds = QualityBounds()
+    assert bounds.faults(row, TIMING) == [] and journal.exists()
     late = row | {'max_cumulative_error_s': 0.31, 'timeout_ratio': 0.02, 'input_delay_s': 0.15,
                   'real_time_ratio_final': 0.98, 'resets': 2, 'gaps': 1}
-    assert timing_faults(late) == [
+    assert bounds.faults(late, TIMING) == [
         'greatest cumulative error 310 ms instead of at most 100 ms',
-        'cycles that took longer than a step 2.0 % instead of at most 1.0 %',
-        'real-time ratio 0.980 instead of at least 0.990',
+        'cycles that took longer than a step 2.0 % instead of at most 1 %',
+        'real-time ratio 0.980 instead of at least 0.99',
         'drift resets 2 instead of at most 0', 'cycles not recorded 1 instead of at most 0',
         'input delay 150 ms instead of at most 100 ms']
-    assert set(BOUNDS.as_dict()) <= row.keys()
+    assert {*TIMING, *PAGE} <= row.keys()
 
 
 def test_before_the_first_session_there_is_a_report(studied: Studied, tmp_path: Path) -> None:

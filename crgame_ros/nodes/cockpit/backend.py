@@ -3,13 +3,12 @@
 """The live run behind the page: everything the page shows and orders, in one asyncio task."""
 
 import asyncio
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 import time
 from typing import Literal, NamedTuple
 
 from crgame_ros.cockpit.client import Client
-from crgame_ros.cockpit.held_seat import HeldSeat
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.page_messages import (
     Command,
@@ -40,12 +39,13 @@ REPORT_PERIOD_S = 1.0
 
 class _Told(NamedTuple):
     state: Sound | SeenView
+    device: str
     at_s: float
 
 
 class PageReport:
     """
-    Reports of the sound and view of each held seat's page: every second and at each change.
+    Reports of the sound and view of each seat's page: every second and at each change.
 
     :param diagnostics: of the node.
     """
@@ -54,29 +54,26 @@ class PageReport:
         self._diagnostics = diagnostics
         self._told: dict[str, _Told] = {}
 
-    def publish(self, seats: Iterable[HeldSeat], clients: Mapping[str, Client],
-                stamp_ns: int) -> None:
+    def publish(self, pages: Mapping[str, Client], stamp_ns: int) -> None:
         """
         Publish the states that have changed, and those not published for a second.
 
-        :param clients: by id.
+        :param pages: by seat.
         :param stamp_ns: simulation time [ns]
         """
         now_s = time.monotonic()
         told = {}
-        for seat in seats:
-            client = clients.get(seat.holder)
-            if client is None:
-                continue
-            for subject, state in ((f'{seat.id} sound', client.sound),
-                                   (f'{seat.id} view', client.view)):
+        for seat, client in pages.items():
+            for subject, state in ((f'{seat} sound', client.sound), (f'{seat} view', client.view)):
                 before = self._told.get(subject)
-                if before is not None and state == before.state \
+                if before is not None and (state, client.device) == before[:2] \
                         and now_s - before.at_s < REPORT_PERIOD_S:
                     told[subject] = before
                     continue
-                told[subject] = _Told(state, now_s)
+                told[subject] = _Told(state, client.device, now_s)
                 text, values = _words(state)
+                if state is client.view:
+                    values['device'] = client.device
                 self._diagnostics.publish(f'cockpit_node: {subject}', DiagnosticStatus.OK, text,
                                           values, stamp_ns)
         self._told = told
@@ -93,7 +90,8 @@ def _words(state: Sound | SeenView) -> tuple[str, dict[str, object]]:
         'eye_distance_m': _number(state.eye_distance_m, 3),
         'width_px': _number(state.width_px, 0), 'height_px': _number(state.height_px, 0),
         'ratio': _number(state.ratio, 3), 'rate_hz': _number(state.rate_hz, 1),
-        'renderer': state.renderer, 'software': state.software}
+        'renderer': state.renderer, 'software': state.software, 'away': state.away,
+        'full_screen': state.full_screen}
 
 
 def _number(value: float | None, digits: int) -> str:
@@ -189,8 +187,14 @@ class LiveBackend:
         self._people.publish(time.monotonic())
         if self._feed.scenario is not None:
             self._page_report.publish(
-                self._desk.table.held.values(), self._hub.clients,
-                self._feed.scenario.game.scheduler.stamp_ns(self._feed.n))
+                self._pages(), self._feed.scenario.game.scheduler.stamp_ns(self._feed.n))
+
+    def _pages(self) -> dict[str, Client]:
+        """Return the page of each seat: its holder's, or that of who rides in an AV."""
+        held, clients = self._desk.table.held, self._hub.clients
+        pages = {client.view.stage: client for client in clients.values() if client.view.stage}
+        return pages | {seat: clients[each.holder] for seat, each in held.items()
+                        if each.holder in clients}
 
     def _seat_who_chose(self) -> None:
         """Seat the client that uploaded the game, now that it has begun."""

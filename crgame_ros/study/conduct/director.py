@@ -8,10 +8,12 @@ from pathlib import Path
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import EVENTS, GAME, GameDocument
+from crgame_ros.game.task_documents import TASK_LOG
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
 from crgame_ros.ros.messages import from_time
+from crgame_ros.study.drive_watch import DriveWatch
 from diagnostic_msgs.msg import DiagnosticStatus
 import rclpy
 from rclpy.context import Context
@@ -26,6 +28,7 @@ class Director:
 
     :param domain_id: of the graph.
     :ivar status: of the run.
+    :ivar drive_watch: gets statuses and tasks of the present drive; None without one.
     """
 
     def __init__(self, domain_id: int) -> None:
@@ -39,11 +42,13 @@ class Director:
         self._games = endpoints.polled('/scenario/game')
         self._events = endpoints.polled('/scenario/events')
         self._diagnostics = endpoints.polled('/diagnostics', depth=_QUEUE)
+        self._tasks = endpoints.polled(TASK_LOG.topic, depth=_QUEUE)
         self._verdicts: PolledSubscription | None = None
         self._seat = ''
         self._stamp_ns = 0
         self.status = RunStatus()
         self.game: GameDocument | None = None
+        self.drive_watch: DriveWatch | None = None
 
     @property
     def epoch(self) -> int:
@@ -68,8 +73,11 @@ class Director:
                     break
                 stamp_ns = from_time(message.header.stamp)
                 if self.game is not None and stamp_ns >= self.game.scheduler.clock_offset_ns:
-                    for status in message.status:
-                        self.status.add(read_status(status), self.time_s)
+                    for status in map(read_status, message.status):
+                        self.status.add(status, self.time_s)
+                        if self.drive_watch is not None:
+                            self.drive_watch.add(status, self.time_s)
+        self._read_tasks()
 
     async def load(self, game: Path) -> None:
         """
@@ -129,6 +137,17 @@ class Director:
             events = EVENTS.read(message.data)
             if events.epoch == self.game.epoch:
                 self.status.add_events(events.fired, self.game.scheduler.dt_s)
+
+    def _read_tasks(self) -> None:
+        for _ in range(_QUEUE):
+            message = self._tasks.pop()
+            if message is None:
+                return
+            # Another program may publish a malformed document there.
+            with suppress(InputError):
+                log = TASK_LOG.read(message.data)
+                if self.drive_watch is not None and log.epoch == self.epoch:
+                    self.drive_watch.add_tasks(log.entries)
 
     def _read_clock(self) -> None:
         message = self._clock.latest()

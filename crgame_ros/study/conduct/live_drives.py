@@ -25,8 +25,12 @@ from crgame_ros.study.conduct.study_drive import (
 )
 from crgame_ros.study.conduct.study_graph import StudyGraph
 from crgame_ros.study.drive_state import DrivePhase, DriveState
+from crgame_ros.study.drive_watch import DriveWatch
 from crgame_ros.study.participant_session import ParticipantSession
+from crgame_ros.study.quality import PAGE, TIMING
+from crgame_ros.study.session_journal import SessionEvent
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
+from crgame_ros.study.trial_plan import PlannedTrial
 
 LOOK_S = 0.02
 # Time limit for closing a recording and for loading a game [s].
@@ -34,6 +38,8 @@ CLOSES_S = 20.0
 LOADS_S = 60.0
 # A trial does not count if the participant's page was gone for this long [s].
 LOST_S = 2.0
+# Begins the reason why a drive came again that was complete.
+DOUBTFUL = 'its data do not hold: '
 # A graph that dies this often within this time is not restarted [s].
 MAX_DEATHS, DEATHS_S = 3, 120.0
 
@@ -207,6 +213,7 @@ class LiveDrives:
         await director.start()
         began_at_s = 0.0
         disturbance = Disturbance(LOST_S)
+        watch = director.drive_watch = DriveWatch(drive.seat)
         while director.status.run != 'ended':
             if director.status.run == 'running' and not began_at_s:
                 began_at_s = time.time()
@@ -218,6 +225,7 @@ class LiveDrives:
             if self._abort is not None or not self._is_due(item):
                 await self._break_off(item, self._abort)
                 return
+            self._tell_doubts(watch)
             await self._poll()
         if reason := cut_short(director.status.reason):
             await self._break_off(item, reason)
@@ -226,13 +234,39 @@ class LiveDrives:
         told = {'run': run, 'attempt': attempt, 'asked_at': asked_at_s, 'start_at': began_at_s,
                 **outcome_of(director.status, drive.seat, director.time_s)}
         await self._until(lambda: _is_closed(folder), CLOSES_S, 'the recording is not closed')
+        watch.add_timing(director.status.timing)
+        doubts = self._doubts(watch)
+        told |= {'quality': watch.values(), 'doubts': list(doubts)}
+        step = session.study.quality.next_step(doubts, self._repeats(item))
+        if isinstance(item.what, PlannedTrial) and step == 'repeat':
+            session.abort(f'{DOUBTFUL}{"; ".join(doubts)}', item.id)
+            self._set_phase(DrivePhase.PREPARING, item.id, 'the drive comes again')
+            return
         if isinstance(item.what, PracticeDrives):
             wanted_s = item.what.practice.seconds
             told['clean_s'] = clean_s(director.status, drive.seat, director.time_s)
             session.practised(told['clean_s'] >= wanted_s, **told)
         else:
+            if step == 'stop':
+                session.hold(True)
             session.finish(**told)
         self._set_phase(DrivePhase.NONE)
+
+    def _doubts(self, watch: DriveWatch) -> tuple[str, ...]:
+        return tuple(self._session.study.quality.faults(watch.values(), {**TIMING, **PAGE}))
+
+    def _tell_doubts(self, watch: DriveWatch) -> None:
+        """Tell what is beyond a bound as soon as it is."""
+        doubts = self._doubts(watch)
+        if doubts != self._state.doubts and self._state.phase is DrivePhase.DRIVING:
+            self._state = replace(self._state, doubts=doubts)
+            self._tell()
+
+    def _repeats(self, item: SessionItem) -> int:
+        """Return how often a drive came again because of its data."""
+        return sum(entry['entry'] == SessionEvent.ABORTED and entry['item'] == item.id
+                   and str(entry.get('reason')).startswith(DOUBTFUL)
+                   for entry in self._session.journal.entries)
 
     async def _break_off(self, item: SessionItem, reason: str | None) -> None:
         """End a run that does not count: it was aborted, or its item was skipped."""
@@ -309,8 +343,11 @@ class LiveDrives:
         state = DriveState(phase, item, attempt, link, None, text)
         if state != self._state:
             self._state = state
-            for changed in self._changed:
-                changed()
+            self._tell()
+
+    def _tell(self) -> None:
+        for changed in self._changed:
+            changed()
 
 
 def _is_closed(folder: Path) -> bool:

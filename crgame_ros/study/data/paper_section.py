@@ -12,7 +12,6 @@ from crgame_ros.analysis.report.text import free, note, number, plain, table
 from crgame_ros.schema.writing import write
 from crgame_ros.software import software_with_commit
 from crgame_ros.study.data.study_data import StudyData
-from crgame_ros.study.data.timing_quality import BOUNDS
 from crgame_ros.study.data.trials_table import measure_columns
 from crgame_ros.study.trial_plan import conditions_of
 
@@ -45,7 +44,7 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
             for scale in data.asked.scales()],
         'delays_s': {name: spread([row.get(name) for row in _rows(data)])
                      for name in ('input_delay_s', 'link_delay_s')},
-        'timing_bounds': BOUNDS.as_dict(),
+        'quality_bounds': study.quality.as_dict(),
         'view': {'geometry': 'docs/driver_view.md',
                  'shown': sorted({row['view'] for row in _rows(data) if row.get('view')}),
                  **{name: spread([row.get(name) for row in _rows(data)]) for name in _VIEW_NAMES}},

@@ -12,7 +12,6 @@ from crgame_ros.analysis.report.text import free, marked, note, NOTHING, number,
 from crgame_ros.study.data.condition_section import condition_section
 from crgame_ros.study.data.paper_section import paper_section
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
-from crgame_ros.study.data.timing_quality import bounds_told
 from crgame_ros.whole_file import write_text
 
 _STYLE = Path(__file__).resolve().parent / 'page' / 'study.css'
@@ -111,10 +110,10 @@ def _timing(data: StudyData) -> str:
         return note('No trial counts yet.')
     # A number and its unit stay on one line.
     bounds = '; '.join(f'{words} <span class="bound">{plain(bound)}</span>'
-                       for words, bound in bounds_told())
+                       for words, bound in data.folder.study.quality.told())
     html = note(f'Bounds: {bounds}. They are marked with ‼ and said at the end of the row; such '
-                'trials stay in the tables, where timing_flag tells them. What is not known is '
-                'not judged.')
+                'trials stay in the tables, where timing_flag and page_flag tell them. What is '
+                'not known is not judged.')
     return html + table('Timing of the trials that count', (
         '', 'trial', 'condition', *(words for _, words, _, _ in _TIMES), 'beyond'),
         list(_timed(data.trials)), 'numbers trials')
@@ -123,7 +122,7 @@ def _timing(data: StudyData) -> str:
 def _timed(trials: Sequence[CountedTrial]) -> Iterator[Sequence[str]]:
     for trial in trials:
         row = trial.row
-        reason = row['timing_reason']
+        reason = '; '.join(filter(None, (row['timing_reason'], row['page_reason'])))
         beyond = marked(free(reason), True) if reason else free(row['problem'] or '')
         yield (free(row['participant']), str(row['trial']), free(row['condition']),
                *(_value(row.get(name), factor, digits) for name, _, factor, digits in _TIMES),

@@ -23,7 +23,7 @@ from crgame_ros.study.data.conducted_study import ConductedStudy
 from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.run_tables import RunTables
 from crgame_ros.study.data.study_row_table import flag_column, unlike, with_unit
-from crgame_ros.study.data.timing_quality import timing_faults
+from crgame_ros.study.quality import PAGE, TIMING
 from crgame_ros.study.trial_plan import PlannedTrial
 
 _SCORED = ('hit_rate', 'response_mean_s', 'response_median_s')
@@ -117,7 +117,17 @@ _TIMING = (
            empty='not recorded'),
     flag_column('timing_flag', 'whether its timing is beyond a bound'),
     Column('timing_reason', TEXT, '', 'what of its timing is beyond which bound',
-           empty='nothing is'))
+           empty='nothing is'),
+    *(Column(name, kind, unit, what, 'by the page and the log of tasks, during the drive',
+             empty='not watched') for name, kind, unit, what in (
+        ('stimuli', INTEGER, '1', 'lights and requests that came'),
+        ('unseen_stimuli', INTEGER, '1', 'of these, those that the page has not shown'),
+        ('away_s', NUMBER, 's', 'time for which the page was hidden or without the focus'),
+        ('windowed_s', NUMBER, 's', 'time for which the page did not fill the screen'),
+        ('device_changes', INTEGER, '1', 'changes of the input device'))),
+    flag_column('page_flag', "whether a value of the participant's page is beyond a bound"),
+    Column('page_reason', TEXT, '', 'what of it is beyond which bound', empty='nothing is'))
+_WATCHED = ('stimuli', 'unseen_stimuli', 'away_s', 'windowed_s', 'device_changes')
 _ANSWERED = Column('answered_attempt', INTEGER, '1', 'the attempt after which its questions were '
                    'answered', empty='there are no answers')
 _LEFT_OUT = ('run', 'id', 'role', 'driver', 'vehicle_model', 'planning_problem', 'length', 'width',
@@ -178,8 +188,12 @@ class TrialsTable:
             **self._drive(record, attempt), 'problem': problem or None}
         if run is not None:
             row |= self._measured(attempt, run)
-        faults = timing_faults(row)
-        row |= {'timing_flag': bool(faults), 'timing_reason': '; '.join(faults)}
+        watched = attempt.says('quality')
+        if isinstance(watched, Mapping):
+            row |= {name: value for name, value in watched.items() if name in _WATCHED}
+        for kind, checks in (('timing', TIMING), ('page', PAGE)):
+            faults = self._folder.study.quality.faults(row, checks)
+            row |= {f'{kind}_flag': bool(faults), f'{kind}_reason': '; '.join(faults)}
         return row | self._answers(record, trial)
 
     def _drive(self, record: ParticipantRecord, attempt: TrialAttempt) -> dict[str, object]:

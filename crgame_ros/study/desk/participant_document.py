@@ -164,7 +164,7 @@ def experimenter_document(desk: Desk, page: Mapping[str, object]) -> dict[str, o
         'waits': desk.waits, 'ending': desk.ending,
         'over': how_over(desk) if item is None else '', 'can_abort': desk.can_abort,
         'drive': {'phase': state.phase.value, 'item': state.item, 'attempt': state.attempt,
-                  'time_s': state.time_s, 'text': state.text},
+                  'time_s': state.time_s, 'text': state.text, 'doubts': list(state.doubts)},
         'items': _items(desk), 'log': _log(desk)}
 
 
@@ -180,7 +180,8 @@ def _items(desk: Desk) -> list[dict[str, object]]:
                 attempts[name] += 1
             case SessionEvent.FINISHED | SessionEvent.SKIPPED:
                 states[name] = entry['entry']
-                outcomes[name] = str(entry.get('outcome', entry.get('reason', '')))[:LONGEST]
+                outcomes[name] = '; '.join((str(entry.get('outcome', entry.get('reason', ''))),
+                                            *map(str, entry.get('doubts') or ())))[:LONGEST]
             case SessionEvent.REPEATED:
                 states.pop(name, None)
                 outcomes.pop(name, None)

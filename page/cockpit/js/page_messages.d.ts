@@ -144,6 +144,9 @@ export interface SeenView {
   eye_distance_m?: number | null;
   rate_hz?: number | null;
   renderer?: string;
+  away?: string;
+  full_screen?: boolean | number;
+  stage?: string | '';
 }
 
 /** How loud the page is, and how strong its gamepad rumbles. */

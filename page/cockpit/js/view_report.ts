@@ -53,7 +53,8 @@ class ViewReport {
   get #choice(): Omit<ViewMessage, 'ratio' | 'rate_hz'> {
     const { view3d, world, stage } = window.crgame;
     const { clientWidth: width_px, clientHeight: height_px } = this.#stage;
-    const rest = { width_px, height_px, bare: Number(stage !== undefined) };
+    const rest = { width_px, height_px, bare: Number(stage !== undefined), away: this.#away,
+      full_screen: Number(fillsScreen()), stage: stage?.address.seat ?? '' };
     const picture = view3d?.on ? view3d.picture : null;
     if (view3d === undefined || picture === null) {
       return { type: 'view', shown: 'map', inset: 0, mirrors: 0, across_deg: null,
@@ -74,6 +75,12 @@ class ViewReport {
     };
   }
 
+  /** @returns why the driver's inputs have no effect; empty while they have */
+  get #away(): string {
+    return window.crgame.driving?.away
+      ?? (document.visibilityState !== 'visible' ? 'hidden' : document.hasFocus() ? '' : 'focus');
+  }
+
   get #ratio() {
     const { view3d } = window.crgame;
     return view3d?.on && view3d.picture !== null ? view3d.picture.stats.ratio
@@ -84,6 +91,12 @@ class ViewReport {
     const { view3d, world } = window.crgame;
     return view3d?.on ? view3d.stats?.frames ?? 0 : world.stats.frames;
   }
+}
+
+/** Return whether the browser's window fills the screen, also around a frame. */
+function fillsScreen() {
+  return window.matchMedia('(display-mode: fullscreen)').matches
+    || (window.outerWidth >= window.screen.width && window.outerHeight >= window.screen.height);
 }
 
 /**

@@ -159,6 +159,7 @@ class ExperimenterPage {
     if (drive.text) {
       lines.push(drive.text);
     }
+    lines.push(...drive.doubts.map((doubt) => `Data in doubt: ${doubt}`));
     if (shown.page.error) {
       lines.push(shown.page.error);
     }
@@ -171,7 +172,7 @@ class ExperimenterPage {
     }
     setText(part(document.body, 'now-text'), lines.join('\n'));
     setAttribute(part(document.body, 'now'), 'data-alarm',
-      drive.phase === 'failed' || Boolean(shown.page.error));
+      drive.phase === 'failed' || drive.doubts.length > 0 || Boolean(shown.page.error));
     setText(this.#orders.hold, shown.held ? 'Go on' : 'Hold before the next item');
     setAttribute(this.#orders.hold, 'disabled', Boolean(over));
     setAttribute(this.#orders.abort, 'disabled', !shown.can_abort);

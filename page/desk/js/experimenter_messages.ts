@@ -27,6 +27,7 @@ export interface DriveNow {
   attempt: number;
   time_s: number | null;
   text: string;
+  doubts: string[]; // what of its data is beyond a bound of the study
 }
 
 export type LogEntry = { entry: string; at: number; [name: string]: unknown }; // of the journal

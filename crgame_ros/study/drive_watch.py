@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Watches a drive: the participant's pictures, focus and device, unseen stimuli, timing."""
+
+from collections.abc import Mapping, Sequence
+import statistics
+
+from crgame_ros.game.task_documents import TaskEntry
+from crgame_ros.messages.status_values import Status, status_truth
+
+# Statuses come every second, and at each change; one that fails to come tells nothing [s].
+_LONGEST_S = 1.5
+# Values of table I: name, key of the status, factor.
+_TIMES = (('max_cumulative_error_s', 'max_cumulative_error_ms', 1e-3),
+          ('timeout_ratio', 'timeout_ratio', 1.0),
+          ('real_time_ratio_final', 'real_time_ratio_final', 1.0), ('resets', 'resets', 1.0))
+
+
+class DriveWatch:
+    """
+    Collects the values of `quality.PAGE`, and of table I, while a drive goes on.
+
+    :param seat: of the participant.
+    """
+
+    def __init__(self, seat: str) -> None:
+        self._name = f'cockpit_node: {seat} view'
+        self._rates_hz: list[float] = []
+        self._before: tuple[float, bool, bool] | None = None
+        self._away_s = self._windowed_s = 0.0
+        self._devices: list[str] = []
+        self._open: dict[tuple[str, int], bool] = {}
+        self._timing: dict[str, float] = {}
+        self.stimuli = self.unseen = 0
+
+    def add(self, status: Status, time_s: float) -> None:
+        """
+        Process a status of the cockpit; ignore all others.
+
+        :param time_s: of the run's clock [s]
+        """
+        values = status.values
+        if status.name != self._name or not values.get('shown') or time_s <= 0.0:
+            return
+        if values.get('rate_hz'):
+            self._rates_hz.append(float(values['rate_hz']))
+        if self._before is not None:
+            before_s, away, windowed = self._before
+            passed_s = min(max(0.0, time_s - before_s), _LONGEST_S)
+            self._away_s += passed_s * away
+            self._windowed_s += passed_s * windowed
+        self._before = (time_s, values.get('away', '') != '',
+                        not status_truth(values, 'full_screen'))
+        device = values.get('device', '')
+        if device and device not in self._devices[-1:]:
+            self._devices.append(device)
+
+    def add_tasks(self, entries: Sequence[TaskEntry]) -> None:
+        """Process entries of the log of tasks."""
+        for entry in entries:
+            key = entry.task, entry.number
+            if entry.what in ('stimulus', 'request'):
+                self.stimuli += 1
+                self._open[key] = False
+            elif entry.what == 'shown' and key in self._open:
+                self._open[key] = True
+            elif entry.what in ('missed', 'over') and entry.by != 'end':
+                self.unseen += not self._open.pop(key, True)
+
+    def add_timing(self, table: Mapping[str, object] | None) -> None:
+        """Take table I as far as it is known: values by name, with `_ms` for milliseconds."""
+        for name, key, factor in _TIMES:
+            value = None if table is None else table.get(key)
+            if isinstance(value, float):
+                self._timing[name] = factor * value
+
+    def values(self) -> dict[str, float]:
+        """Return the values so far; those that the page has not told are missing."""
+        found: dict[str, float] = {'stimuli': self.stimuli, 'unseen_stimuli': self.unseen,
+                                   **self._timing}
+        if self._rates_hz:
+            found['view_rate_hz'] = round(statistics.median(self._rates_hz), 1)
+        if self._before is not None:
+            found |= {'away_s': round(self._away_s, 2), 'windowed_s': round(self._windowed_s, 2),
+                      'device_changes': max(0, len(self._devices) - 1)}
+        return found
