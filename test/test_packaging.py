@@ -28,7 +28,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 NODES = ('sim_node', 'driver_node', 'planner_node', 'drivability_node', 'criticality_node',
          'timesync_node', 'recorder_node', 'marker_node', 'cockpit_node',
-         'perception_node', 'traffic_node', 'map_node')
+         'perception_node', 'traffic_node', 'map_node', 'instruments_node')
 DATA = ('launch', 'config', 'examples', 'scenarios', 'msg_defs', 'page')
 PINS = ('requirements.txt', 'requirements-planners.txt')
 # Modules of ROS packages whose name is no ROS package's.

@@ -24,6 +24,7 @@ from crgame_ros.game.game import (
     PredictionSpec,
     TimingSpec,
 )
+from crgame_ros.game.instruments_spec import InstrumentsSpec
 from crgame_ros.game.object_spec import ObjectList, ObjectSpec
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
@@ -118,6 +119,7 @@ class GameDocument:
     sound: str = 'on'
     environment: Annotated[EnvironmentSpec, Declared()] | None = None
     tasks: Annotated[tuple[TaskSpec, ...], Declared(TaskList)] = ()
+    instruments: Annotated[InstrumentsSpec, Declared()] | None = None
     language: str = 'en'
     file: str = ''
 

@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar, Literal
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import EventList
 from crgame_ros.game.expectation import ExpectationList
+from crgame_ros.game.instruments_spec import InstrumentsSpec
 from crgame_ros.game.object_spec import ObjectList
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.task_spec import TaskList
@@ -324,6 +325,7 @@ class Game:
     :param sound: whether pages may play sound and gamepads rumble; `none` for a study without.
     :param environment: light and air in the displayed world.
     :param tasks: tasks that drivers answer or do besides driving.
+    :param instruments: streams of the Lab Streaming Layer, and triggers; None for none.
     :param expect: what a run has to keep, for `crgame test`.
     :param vary: what may vary, for `crgame evaluate` and `crgame search`; a run without them takes
         the values as they are.
@@ -352,6 +354,7 @@ class Game:
     sound: Annotated[Literal['on', 'none'], Meaning(True, 'on'), LeftOut()] = 'on'
     environment: EnvironmentSpec | None = None
     tasks: Annotated[TaskList, LeftOut()] = ()
+    instruments: InstrumentsSpec | None = None
     expect: Annotated[ExpectationList, LeftOut()] = ()
     vary: Annotated[VariationList, LeftOut()] = ()
     language: Annotated[Literal['en', 'de'], LeftOut()] = 'en'

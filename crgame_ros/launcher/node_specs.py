@@ -68,7 +68,7 @@ def at_end(request: RunRequest) -> str:
 
 def participant_specs(participants: Participants, roster: Path) -> list[NodeSpec]:
     """
-    Return the nodes that a game's vehicles, perception, traffic and map need.
+    Return the nodes that the vehicles, perception, traffic, map and instruments of a game need.
 
     :param roster: file in which sim_node names the code that they may run.
     """
@@ -88,6 +88,8 @@ def participant_specs(participants: Participants, roster: Path) -> list[NodeSpec
                               restart=True))
     if participants.occupancy:
         specs.append(NodeSpec('map_node', 'map_node', nice=COMPANION_NICE, restart=True))
+    if participants.instruments:
+        specs.append(NodeSpec('instruments_node', 'instruments_node', restart=True))
     return specs
 
 

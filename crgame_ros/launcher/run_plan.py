@@ -18,6 +18,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.events import PlannerSwap
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, TimingSpec
+from crgame_ros.instruments.extra import require_instruments
 from crgame_ros.launcher.arguments import cockpit_host, RunRequest
 from crgame_ros.library.stored_index import is_kept
 from crgame_ros.paths import check_room, default_game, numbered
@@ -227,6 +228,8 @@ def plan_run(request: RunRequest, now: Callable[[], datetime] = datetime.now) ->
 
 def _check_run(request: RunRequest, setup: Setup) -> None:
     recorded_inputs(setup)
+    if setup.game.instruments is not None:
+        require_instruments(setup.game.instruments)
     if request.headless and any(human.driver == COCKPIT for human in setup.humans):
         raise InputError('there is no page in which to take a seat', '--headless',
                          'leave it out, or name another driver')

@@ -43,6 +43,7 @@ def describe_game(setup: Setup, *, epoch: int = 0, clock_offset_ns: int = 0,
         environment=environment_of(setup.loaded.scenario, game.environment),
         tasks=tuple(replace(task, seat=task_seat(task, setup.vehicle_ids))
                     for task in game.tasks),
+        instruments=game.instruments,
         language=game.language, file=game.dump())
 
 

@@ -19,6 +19,7 @@ class Participants:
     :param perceiving: AVs with perception.
     :param traffic: whether there are agents.
     :param occupancy: whether there is a map of permanent obstacles.
+    :param instruments: whether there are streams or triggers.
     :param code: class names in the game from the user's own modules and files.
     """
 
@@ -27,6 +28,7 @@ class Participants:
     perceiving: tuple[str, ...] = ()
     traffic: bool = False
     occupancy: bool = False
+    instruments: bool = False
     code: tuple[str, ...] = ()
 
     @classmethod
@@ -36,6 +38,7 @@ class Participants:
                    {av.id: av.spec.planner for av in setup.avs},
                    tuple(av.id for av in setup.avs if av.spec.perception is not None),
                    setup.traffic is not None, setup.game.occupancy is not None,
+                   setup.game.instruments is not None,
                    tuple(sorted(_code(asdict(setup.game)))))
 
     @classmethod

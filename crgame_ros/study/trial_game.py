@@ -52,7 +52,8 @@ def trial_game(settings: TrialSettings, driver: str) -> Game:
     game = replace(
         game, events=(*game.events, *settings.events),
         tasks=tasks_over(game.tasks, settings.tasks),
-        sound='on' if settings.sound else 'none')
+        sound='on' if settings.sound else 'none',
+        instruments=settings.instruments or game.instruments)
     if settings.duration is not None:
         game = replace(game, duration=settings.duration)
     seed = settings.seed if isinstance(settings.seed, int) else 0

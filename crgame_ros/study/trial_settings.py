@@ -8,6 +8,7 @@ import random
 from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.game.events import EventList
+from crgame_ros.game.instruments_spec import InstrumentsSpec
 from crgame_ros.game.task_spec import TaskList, TaskSpec
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Named, Within, Wording
@@ -37,6 +38,7 @@ class TrialSettings:
     :param plans: whether AVs' plans and perceptions may be shown.
     :param names: whether the names of planners are shown.
     :param sound: whether sound is on.
+    :param instruments: streams and triggers, instead of the game's.
     :param events: added to those of the game.
     :param tasks: besides driving, added to those of the game; a task replaces an outer one of the
         same name.
@@ -58,6 +60,7 @@ class TrialSettings:
     plans: bool | None = None
     names: bool | None = None
     sound: bool | None = None
+    instruments: InstrumentsSpec | None = None
     events: EventList = ()
     tasks: TaskList = ()
 

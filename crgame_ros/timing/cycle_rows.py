@@ -17,6 +17,8 @@ TIMING_COLUMNS = (
     'sleep_s', 'dt_eff_s', 'resets', 'dropped_s')
 # Causes of the cycle's lateness [s], and its phase; earlier versions lack them.
 LATE_COLUMNS = (*(f'late_{cause}_s' for cause in Causes._fields), 'late_in')
+# Start of the cycle on the machine's steady clock [s]; NaN offline, and earlier versions lack it.
+STEADY = 'steady_s'
 # Earlier versions had the first four, then no `put_back`.
 COMMAND_COLUMNS = ('throttle', 'brake', 'steering', 'reverse', 'lights', 'put_back')
 # Label of the first dimension of the message.
@@ -24,7 +26,9 @@ CYCLES = 'cycles'
 # No number of timing is larger, in seconds, steps or counts.
 LARGEST = 1e12
 # Their first columns in a row.
-_LATE, _COMMANDS = len(TIMING_COLUMNS), len(TIMING_COLUMNS) + len(LATE_COLUMNS)
+_LATE = len(TIMING_COLUMNS)
+_STEADY = _LATE + len(LATE_COLUMNS)
+_COMMANDS = _STEADY + 1
 
 
 def lights_alone(lights: int) -> tuple[float, ...]:
@@ -42,7 +46,7 @@ class CycleRows:
     """
 
     def __init__(self, vehicle_ids: Sequence[str], capacity: int) -> None:
-        self.columns = TIMING_COLUMNS + LATE_COLUMNS + tuple(
+        self.columns = (*TIMING_COLUMNS, *LATE_COLUMNS, STEADY) + tuple(
             f'{vehicle}/{name}' for vehicle in vehicle_ids for name in COMMAND_COLUMNS)
         self._data = array('d', bytes(8 * capacity * len(self.columns)))
         self._rows = np.frombuffer(self._data).reshape(capacity, len(self.columns))
@@ -61,20 +65,21 @@ class CycleRows:
 
     def add(self, epoch: int, k: int, cycle: Cycle, busy_s: float, sleep_s: float,
             commands: Sequence[Sequence[float]], causes: Causes = NO_CAUSES,
-            late_in: Phase | None = None) -> None:
+            late_in: Phase | None = None, steady_s: float = math.nan) -> None:
         """
         Add one cycle, with the time it worked and slept [s].
 
         :param commands: of each vehicle (`Simulation.command_rows`).
         :param causes: of its lateness [s]
         :param late_in: phase in which most of it came; None if it was not late.
+        :param steady_s: start of the cycle on the machine's steady clock; NaN for none [s]
         """
         row = self._rows[self.count]
         row[:_LATE] = (
             epoch, cycle.n, k, cycle.ideal_s, cycle.actual_s, cycle.step_error_s,
             cycle.cumulative_error_s, busy_s, sleep_s, cycle.dt_eff_s, cycle.resets,
             cycle.dropped_s)
-        row[_LATE:_COMMANDS] = (*causes, 0 if late_in is None else late_in)
+        row[_LATE:_COMMANDS] = (*causes, 0 if late_in is None else late_in, steady_s)
         place = _COMMANDS
         for command in commands:
             end = place + len(COMMAND_COLUMNS)
@@ -144,6 +149,17 @@ class CycleTable:
         if any(name not in self._place for name in LATE_COLUMNS):
             return None
         return self.rows[:, [self._place[name] for name in LATE_COLUMNS]]
+
+    def steady_rows(self) -> NDArray[np.float64]:
+        """
+        Return (R, 2) rows of n, and the start of that cycle on the machine's steady clock [s].
+
+        Cycles whose start is not known are left out, as are all of earlier versions.
+        """
+        if STEADY not in self._place:
+            return np.empty((0, 2))
+        found = self.rows[:, [self._place['n'], self._place[STEADY]]]
+        return found[np.abs(found[:, 1]) <= LARGEST]
 
     def commands(self, vehicle_id: str) -> NDArray[np.float64]:
         """

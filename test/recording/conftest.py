@@ -13,6 +13,15 @@ from crgame_ros.cli import main
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.game.documents import EVENTS, FiredEvents, GAME, OBJECTS
 from crgame_ros.game.game import AvSpec, Game, HumanSpec
+from crgame_ros.messages.instrument_samples import (
+    InstrumentStream,
+    InstrumentStreams,
+    SampleBatch,
+    STREAMS,
+    TEXTS,
+    TextSamples,
+    TextTimes,
+)
 from crgame_ros.messages.joints import object_joint_names, vehicle_joint_names, vehicle_to_joints
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.metadata import TopicQos
@@ -90,6 +99,11 @@ def samples() -> Samples:
     return Samples()
 
 
+# Start of a run on the steady clock of its machine, and the clock of another one: it is as long
+# ahead [s], and runs faster by this.
+STEADY_S, FOREIGN_S, DRIFT = 1000.0, 500_000.0, 50e-6
+
+
 class RunRecorder:
     """
     Makes recordings of offline runs: the messages that the graph would have published.
@@ -135,12 +149,13 @@ class RunRecorder:
     def messages(self, result: OfflineResult, *, epoch: int = 0, offset_ns: int = 0,
                  log_ns: int = 1_700_000_000_000_000_000,
                  intervals_s: Any = None, tick_states: bool = False,
-                 ) -> list[tuple[str, str, int, bytes]]:
+                 steady_s: float = STEADY_S) -> list[tuple[str, str, int, bytes]]:
         """
         Write a run as (topic, type, log time, data), logged 1 ms after its stamps and `log_ns`.
 
         :param intervals_s: Delta t_eff of each step, the nominal step where None.
         :param tick_states: write the topic that only `ros2 bag record -a` records.
+        :param steady_s: start of the run on the steady clock of its machine [s]
         """
         setup = result.setup
         scheduler = replace(setup.scheduler, clock_offset_ns=offset_ns)
@@ -180,12 +195,49 @@ class RunRecorder:
                 cycle = Cycle(n, n * scheduler.dt_s, n * scheduler.dt_s + lags_s[n],
                               dt_s - scheduler.dt_s, lags_s[n], dt_s, 0, 0.0)
                 rows.add(epoch, scheduler.k(n), cycle, 0.001, 0.009,
-                         [*result.commands[n], *result.av_commands[n]])
+                         [*result.commands[n], *result.av_commands[n]],
+                         steady_s=steady_s + n * scheduler.dt_s)
                 self.rows[n] = rows.taken()
                 found.append(('/timing/cycle', 'std_msgs/msg/Float64MultiArray', at_ns,
                               self.cycle_rows(rows.columns, self.rows[n:n + 1])))
         self.rows = self.rows[1:]
         return found
+
+    def instruments(self, log_ns: int = 1_700_000_000_000_000_000,
+                    ) -> list[tuple[str, str, int, bytes]]:
+        """
+        Write what two programs sent around a run, from a machine with another clock.
+
+        A heart at 50 Hz from 0.2 s before the start on, without 0.5 to 0.8 s; its value is its
+        time on the run's clock. Two texts at 0.25 s and 0.75 s.
+        """
+        beats_s = np.arange(-10, 60) / 50.0
+        beats_s = beats_s[(beats_s < 0.5) | (beats_s > 0.8)]
+        texts_s = np.array([0.25, 0.75])
+        streams = InstrumentStreams((
+            InstrumentStream(1, 'Heart', 'ECG', ('lead,1', 'lead 2'), ('mV', ''), 50.0, 'float32',
+                             'amplifier', 'lab', True, 1),
+            InstrumentStream(2, 'Notes', 'Markers', ('text',), ('',), 0.0, 'string', 'notes')))
+
+        def times(at_s: Any) -> Any:
+            # Measured once a second, and not yet for the first samples.
+            sent_s, known_s = at_s * (1.0 + DRIFT) + FOREIGN_S, np.floor(at_s)
+            offsets_s = STEADY_S + known_s - (known_s * (1.0 + DRIFT) + FOREIGN_S)
+            offsets_s[at_s < -0.1] = np.nan
+            return np.column_stack((np.zeros(len(at_s)), sent_s, offsets_s,
+                                    np.full(len(at_s), 1e-4), STEADY_S + at_s + 0.01))
+        heart = SampleBatch(1, times(beats_s), np.column_stack((beats_s, -beats_s)))
+        notes = TextSamples(2, tuple(TextTimes(0, *row[1:]) for row in times(texts_s).tolist()),
+                            (('now',), ('=then\t"',)))
+        rows = np.array(heart.flat()).reshape(len(beats_s), -1)
+        string = 'std_msgs/msg/String'
+        # The list of streams may be recorded after the first samples.
+        return [('/instruments/samples', 'std_msgs/msg/Float64MultiArray', log_ns,
+                 self.cycle_rows(heart.label(('a', 'b')).split(','), rows)),
+                ('/instruments/streams', string, log_ns + 1,
+                 self._samples.string(STREAMS.write(streams))),
+                ('/instruments/texts', string, log_ns + 2,
+                 self._samples.string(TEXTS.write(notes)))]
 
     @staticmethod
     def ours(folder: Path, messages: Sequence[tuple[str, str, int, bytes]]) -> Path:

@@ -132,7 +132,8 @@ class StudyMaker:
             'hv0': ReplayDriver(commands)}, check_drivability=False)
         folder = session.journal.path.parent / run
         folder.mkdir(parents=True, exist_ok=True)
-        self.recorder.ours(folder / 'bag', self.recorder.messages(result))
+        self.recorder.ours(folder / 'bag', [
+            *self.recorder.messages(result), *self.recorder.instruments()])
         if finished:
             (folder / FINISHED_MARK).touch()
         return folder

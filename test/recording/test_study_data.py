@@ -4,6 +4,7 @@
 
 from collections.abc import Callable
 import csv
+import gzip
 import hashlib
 import json
 import math
@@ -203,6 +204,31 @@ def test_bids_files_hold_what_happened(studied: Studied) -> None:
     for text in (NASTY, 'n/a', '\\n', '\t\r\n"'):
         assert '\t' not in escaped(text) and '\n' not in escaped(text)
         assert unescaped(escaped(text)) == text and escaped(text) != 'n/a'
+
+
+def test_instruments_are_in_bids_as_it_has_them(studied: Studied) -> None:
+    """A steady stream is a physiological recording with a gap, texts are events; one zero."""
+    folder = studied.folder / 'data' / 'bids' / 'sub-P01' / 'beh'
+    name = 'sub-P01_task-demo_run-2_recording-Heart_physio'
+    told = json.loads((folder / f'{name}.json').read_text('utf-8'))
+    assert told['Columns'] == ['lead,1', 'lead 2'] and told['lead,1'] == {'Units': 'mV'}
+    assert told['SamplingFrequency'] == 50.0
+    with gzip.open(folder / f'{name}.tsv.gz', 'rt') as stream:
+        rows = [line.rstrip('\n').split('\t') for line in stream]
+    # From 0.2 s before the run on, 50 a second, n/a where none is near.
+    assert len(rows) == 70 and rows[40] == ['n/a', 'n/a']
+    values = np.array([math.nan if row[0] == 'n/a' else float(row[0]) for row in rows])
+    assert np.nanmax(np.abs(values - (np.arange(70) / 50.0 - 0.2))) < 0.021
+    events = list(csv.DictReader((folder / 'sub-P01_task-demo_events.tsv').read_text(
+        'utf-8').split('\n')[:-1], dialect='excel-tab'))
+    notes = [row for row in events if row['trial_type'] == 'instrument' and row['trial'] == '2']
+    assert [(row['name'], row['value']) for row in notes] == [
+        ('Notes', 'now'), ('Notes', escaped('=then\t"'))]
+    begun_s = float(notes[0]['onset']) - float(notes[0]['run_time'])
+    assert told['StartTime'] == pytest.approx(begun_s - 0.2, abs=1e-4)
+    assert [float(row['onset']) for row in events] == sorted(float(row['onset']) for row in events)
+    runs = polars.read_parquet(studied.folder / 'data' / 'runs' / 'instrument_channels.parquet')
+    assert sorted(runs.select('participant', 'trial').unique().rows()) == ROWS
 
 
 def test_every_file_is_valid(studied: Studied, capsys: pytest.CaptureFixture[str]) -> None:

@@ -41,8 +41,8 @@ ONLY_WITH_TASKS = ('/tasks/report', 'sim_node')
 OPTIONAL = frozenset({ONLY_WITH_A_JOY_NODE, ONLY_WITH_DRIVABILITY_STOP, ONLY_WITH_TASKS})
 ONLY_WITH_PERCEPTION = (('/<av>/plan_request', 'sim_node'), ('/<av>/localization', 'cockpit_node'),
                         ('/<av>/scan', 'cockpit_node'))
-# Processes that exist only in a game with reactive traffic and a map.
-ENGINES = ('traffic_node', 'map_node')
+# Processes that exist only in a game with reactive traffic, a map, and instruments.
+ENGINES = ('traffic_node', 'map_node', 'instruments_node')
 # A service is asked so often before it counts as one that does not answer.
 ATTEMPTS = 6
 PARAMETER_TYPES = {'bool': 1, 'integer': 2, 'double': 3, 'string': 4}
@@ -59,7 +59,7 @@ class Case:
     :param avs: ids of the AVs.
     :param used: which optional subscriptions the game needs.
     :param perceiving: AVs with perception.
-    :param engines: whether it has reactive traffic and a map of permanent obstacles.
+    :param engines: whether it has reactive traffic, a map of permanent obstacles, and triggers.
     """
 
     humans: tuple[str, ...]
@@ -136,6 +136,8 @@ def _full_game(folder: Path) -> Path:
     game['avs'][1]['perception'] = {}
     game['traffic'] = {'agents': 2}
     game['tasks'] = [{'name': 'radio', 'secondary_task': {}}]
+    game['instruments'] = {'triggers': {
+        'address': '127.0.0.1:9', 'protocol': 'udp', 'codes': {'stimulus': 1}}}
     assert main(['rasterize', game['scenario'], str(folder / 'map')]) == 0
     game['occupancy'] = str(folder / 'map' / 'map.yaml')
     path = folder / 'full.yaml'

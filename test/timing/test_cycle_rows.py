@@ -29,7 +29,7 @@ def test_columns_name_what_is_in_them() -> None:
     """Each value is found under its name after the way through the flat message."""
     rows = filled()
     table = CycleTable.from_message(','.join(rows.columns), rows.taken())
-    assert table.rows.shape == (2, 12 + 9 + 2 * 6)
+    assert table.rows.shape == (2, 12 + 9 + 1 + 2 * 6)
     expected = {'epoch': (4, 4), 'n': (7, 8), 'k': (12, 13), 'ideal_s': (0.07, 0.08),
                 'actual_s': (0.0701, 0.0805), 'step_error_s': (0.0001, 0.0002),
                 'cumulative_error_s': (0.0002, 0.0005), 'busy_s': (0.002, 0.003),
@@ -39,6 +39,15 @@ def test_columns_name_what_is_in_them() -> None:
     for name, values in expected.items():
         assert table.column(name).tolist() == list(values)
     assert table.epoch == 4
+
+
+def test_starts_on_the_steady_clock_are_those_that_are_known() -> None:
+    """Of a live run, to the nanosecond; offline cycles and earlier versions have none."""
+    rows = filled()
+    rows.add(4, 14, SECOND, 0.0, 0.0, (LEFT, BACK), steady_s=123_456.000_000_007)
+    table = CycleTable.from_message(','.join(rows.columns), rows.taken())
+    assert table.steady_rows().tolist() == [[8.0, 123_456.000_000_007]]
+    assert not len(CycleTable(TIMING_COLUMNS, table.rows[:, :12]).steady_rows())
 
 
 def test_commands_keep_their_bits() -> None:
@@ -89,7 +98,7 @@ def test_taking_empties_the_buffer() -> None:
     rows.add(4, 13, FIRST, 0.0, 0.0, (LEFT, BACK))
     assert rows.full
     taken = rows.taken()
-    assert len(taken) == 3 * 33
+    assert len(taken) == 3 * 34
     assert (rows.count, rows.full, len(rows.taken())) == (0, False, 0)
     rows.add(5, 1, SECOND, 0.0, 0.0, (BACK, LEFT))
     assert (taken[0], taken[1]) == (4.0, 7.0)

@@ -17,6 +17,7 @@ from crgame_ros.analysis.tables.data_package import (
     PACKAGE_FILE,
     WrittenTable,
 )
+from crgame_ros.analysis.tables.instruments import INSTRUMENT_TABLES, write_instruments
 from crgame_ros.analysis.tables.pairs import CROSSINGS, PAIRS, write_criticality
 from crgame_ros.analysis.tables.part import part_rows
 from crgame_ros.analysis.tables.plans import plan_rows, PLANS
@@ -142,7 +143,8 @@ def _earlier(out: Path) -> set[str]:
 
 
 TABLES: tuple[TableDeclaration, ...] = (
-    RUNS, VEHICLES, STATES, PAIRS, CROSSINGS, EVENTS, PLANS, *BEHAVIOUR_TABLES, *TASK_TABLES)
+    RUNS, VEHICLES, STATES, PAIRS, CROSSINGS, EVENTS, PLANS, *BEHAVIOUR_TABLES, *TASK_TABLES,
+    *INSTRUMENT_TABLES)
 
 
 def runs_in(paths: Sequence[Path], epoch: int | None, progress: RunProgress,
@@ -231,6 +233,7 @@ def _add_rows(run: Run, writers: Mapping[str, TableRows]) -> None:
     run.telling('measuring how people drove in')(0.0)
     write_behaviour(run, writers)
     write_tasks(run, writers)
+    write_instruments(run, writers)
     for table, parts in ((EVENTS, EVENT_PARTS), (VEHICLES, VEHICLE_PARTS), (RUNS, RUN_PARTS)):
         if (values := part_rows(parts, run))['run']:
             writers[table.name].add(values)

@@ -408,7 +408,7 @@ class LiveRun:
         busy_s = (time.monotonic_ns() - start_ns) / NS_PER_S
         slept_s = (start_ns - self._pacer.idle_from_ns) / NS_PER_S
         outputs.rows.add(self._epoch, result.k, cycle, busy_s * factor, slept_s * factor,
-                         simulation.command_rows, causes, late_in)
+                         simulation.command_rows, causes, late_in, start_ns / NS_PER_S)
 
     def _at_tick(self, result: StepResult) -> None:
         """Do the work of a scenario tick."""

@@ -22,7 +22,7 @@ CLOCK_AGAIN_NS = NS_PER_S // 10
 DRIVER_PATIENCE_NS = 3 * NS_PER_S
 # Latched topics of nodes that answer nothing: once the recorder has received one, it and the node
 # have discovered each other.
-LATCHED = {'timesync_node': '/timing/frame_skip'}
+LATCHED = {'timesync_node': '/timing/frame_skip', 'instruments_node': '/instruments/streams'}
 
 
 class StartGate:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Writes a study's events and participants in the Brain Imaging Data Structure."""
+"""Writes a study in the Brain Imaging Data Structure: events, participants, instruments."""
 
 from collections.abc import Iterator, Mapping, Sequence
 import csv
@@ -13,15 +13,21 @@ from typing import Any
 from crgame_ros.analysis.tables.column import Column, FLAG
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import prepare_folder
+from crgame_ros.study.data.bids_instruments import (
+    instrument_events,
+    InstrumentEvent,
+    KIND,
+    MISSING,
+    write_recordings,
+)
 from crgame_ros.study.data.participant_record import ParticipantRecord
 from crgame_ros.study.data.session_events_table import EVENTS_OF_SESSIONS
-from crgame_ros.study.data.study_data import StudyData
+from crgame_ros.study.data.study_data import CountedTrial, StudyData
 from crgame_ros.version import __version__
 from crgame_ros.whole_file import write_text
 
 # https://bids-specification.readthedocs.io/en/v1.10.0/
 VERSION = '1.10.0'
-MISSING = 'n/a'
 ESCAPED = (
     'Texts are exact: a backslash, tab, newline and carriage return in them are written as '
     r'\\, \t, \n and \r, and a text that is n/a as n\/a. A field with a double quote '
@@ -33,19 +39,20 @@ _EVENT_COLUMNS = {
               'clock'),
     'duration': ('s', 'how long it took; of a trial from its start to the note of its end'),
     'trial_type': ('', 'what it is, as `kind` in events.csv; a trial that was driven is one '
-                   'event, named trial'),
+                   'event, named trial; instrument is a sample of a stream without a steady rate'),
     'condition': ('', 'of the trial'),
     'trial': ('', 'number of the trial among all of the participant'),
     'attempt': ('', 'at the trial'),
     'item': ('', 'of the session'),
-    'name': ('', 'of a marker, of a game event, or outcome of the trial'),
-    'value': ('', 'a note, a reason, or what else was told'),
+    'name': ('', 'of a marker, of a game event, of a stream, or outcome of the trial'),
+    'value': ('', 'a note, a reason, or what else was told; of a stream with several channels a '
+              'JSON object'),
     'run_time': ('s', "when, on the run's clock")}
 
 
 def write_bids(data: StudyData, out: Path) -> None:
     """
-    Write the data set: description, participants, and each one's events, with sidecars.
+    Write the data set: description, participants, each one's events and instruments, sidecars.
 
     :raises InputError: if the folder cannot be written, or two participants get one label.
     """
@@ -73,8 +80,17 @@ def write_bids(data: StudyData, out: Path) -> None:
         prepare_folder(folder)
         name = f'sub-{labels[record.id]}_task-{task}_events'
         mine = [row for row in events if row['participant'] == record.id]
-        _tsv(folder / f'{name}.tsv', list(_EVENT_COLUMNS), list(_events(record, mine)))
+        trials = [trial for trial in data.trials if trial.record is record]
+        rows = [*_events(record, mine), *(
+            _instrument_row(record, trial, event)
+            for trial in trials for event in instrument_events(trial))]
+        # Equal times stay in the order of the journal.
+        rows.sort(key=lambda row: row[0])
+        _tsv(folder / f'{name}.tsv', list(_EVENT_COLUMNS), rows)
         _json(folder / f'{name}.json', _sidecar())
+        for trial in trials:
+            write_recordings(trial, folder, f'sub-{labels[record.id]}_task-{task}',
+                             record.begun_at)
 
 
 def escaped(value: object) -> str:
@@ -110,6 +126,14 @@ def _events(record: ParticipantRecord,
         yield [onset, duration, kind, None if attempt is None else
                attempt.trial.condition.name, row['trial'], row['attempt'], row['item'], name,
                value, row['time_s']]
+
+
+def _instrument_row(record: ParticipantRecord, trial: CountedTrial,
+                    event: InstrumentEvent) -> list[Any]:
+    attempt = trial.attempt
+    return [event.wall_s - record.begun_at, 0.0, KIND, attempt.trial.condition.name,
+            attempt.trial.number, attempt.attempt, attempt.item, event.stream, event.value,
+            event.run_time_s]
 
 
 def _sidecar() -> dict[str, object]:
