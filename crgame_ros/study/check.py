@@ -10,6 +10,7 @@ from typing import Literal
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.file import parse_game
+from crgame_ros.instruments.extra import require_instruments
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.study.file import Block, Break, Page, Questions, StudyFile
@@ -120,6 +121,8 @@ def _try(settings: TrialSettings) -> None:
     game = trial_game(settings, 'idle')
     # Read it as the run will, so that the combination of several files is checked.
     game = parse_game(yaml.safe_load(game.dump()), 'game of the trial', game.base)
+    if game.instruments is not None:
+        require_instruments(game.instruments)
     run_offline(build_setup(game), duration_s=min(TRIED_S, game.duration))
     if game.duration == float('inf'):
         raise CrgameError('has no end: give "duration" to the game or to the study')

@@ -7,10 +7,12 @@ Another program of a laboratory: it hears the run's clock and sends a pulse at e
 
 A pulse's value is the stamp [s]. Its time is when the simulation published this stamp, by the
 system clock, carried over to LSL's clock. FILE gets a line for each pulse that somebody was
-connected to receive.
+connected to receive: the stamp [ns], and when it was on the kernel's own steady clock [s].
 """
 
+import ctypes
 from pathlib import Path
+import platform
 import sys
 import time
 
@@ -19,6 +21,27 @@ from crgame_ros.ros.environment import prepare_environment
 import pylsl
 
 EVERY = 10
+# Longest time for reading several clocks [s].
+TOGETHER_S = 5e-5
+# Of clock_gettime on x86-64 and ARM.
+CLOCK_GETTIME = {'x86_64': 228, 'aarch64': 113}[platform.machine()]
+
+
+def kernel_steady_s() -> float:
+    """Ask the kernel itself for its steady clock [s], whatever is loaded before the library."""
+    now = (ctypes.c_long * 2)()
+    assert ctypes.CDLL(None).syscall(CLOCK_GETTIME, time.CLOCK_MONOTONIC, now) == 0
+    return now[0] + 1e-9 * now[1]
+
+
+def moment() -> tuple[float, float, float]:
+    """Read LSL's, the kernel's steady and the system clock [s] together, however busy it is."""
+    while True:
+        before_s = kernel_steady_s()
+        foreign_s, system_s = pylsl.local_clock(), time.time()
+        after_s = kernel_steady_s()
+        if after_s - before_s < TOGETHER_S:
+            return foreign_s, 0.5 * (before_s + after_s), system_s
 
 
 def main(name: str, file: Path) -> None:
@@ -43,10 +66,11 @@ def main(name: str, file: Path) -> None:
         stamps.add(stamp_ns)
         if len(stamps) % EVERY:
             return
-        age_s = 1e-9 * (time.time_ns() - told['source_timestamp'])
-        outlet.push_sample([1e-9 * stamp_ns], pylsl.local_clock() - age_s)
+        foreign_s, steady_s, system_s = moment()
+        age_s = system_s - 1e-9 * told['source_timestamp']
+        outlet.push_sample([1e-9 * stamp_ns], foreign_s - age_s)
         with file.open('a') as stream:
-            stream.write(f'{stamp_ns}\n')
+            stream.write(f'{stamp_ns} {steady_s - age_s!r}\n')
 
     node.create_subscription(Clock, '/clock', pulse, 1000)
     rclpy.spin(node)

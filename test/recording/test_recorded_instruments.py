@@ -16,6 +16,8 @@ import pytest
 
 SCENARIO = 'ZAM_LaneChange-1_1_T-1.xml'
 LOG_NS = 1_700_000_000_000_000_000
+# Of the other clock in the recorder's messages.
+DRIFT = 50e-6
 
 
 @pytest.fixture(scope='module')
@@ -57,7 +59,10 @@ def test_tables_have_every_sample_on_the_runs_clock(bag: Path) -> None:
     channels = tables['instrument_channels'].to_pandas().set_index(['stream', 'channel'])
     lead = channels.loc[('Heart', 'lead,1'), ['unit', 'type', 'rate', 'samples', 'gaps']]
     assert lead.to_list() == ['mV', 'ECG', 50.0, 54, 1]
-    assert pd.isna(channels.loc[('Notes', 'text'), 'rate'])
+    assert pd.isna(channels.loc[('Notes', 'text'), ['rate', 'clock_drift']]).all()
+    # Missing, not infinite: there was one measurement.
+    assert tables['instrument_channels']['clock_drift'].null_count == 1
+    assert channels.loc[('Heart', 'lead 2'), 'clock_drift'] == pytest.approx(DRIFT, rel=1e-3)
 
 
 def test_a_sample_belongs_to_one_run(recorder: Any, result: OfflineResult, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 """The tables of other instruments: their channels, and all samples on the run's clock."""
 
 from collections.abc import Mapping
+import math
 
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
@@ -47,8 +48,8 @@ INSTRUMENT_SAMPLES = TableDeclaration(
         Column('time_s', NUMBER, 's', "when it was, on the run's clock", variant='simulated time '
                'between the starts of two cycles, on the straight line between them; before the '
                'first (negative) and after the last as real time', empty=_UNMEASURED),
-        Column('value', NUMBER, '', 'the number, in the unit of its channel',
-               empty='it is a text, or its program sent NaN'),
+        Column('value', NUMBER, '1', 'the number', variant='in the unit of its channel, which '
+               'instrument_channels names', empty='it is a text, or its program sent NaN'),
         Column('text', TEXT, '', 'the text', empty='it is a number'),
         Column('steady_s', NUMBER, 's', 'when it was, on the steady clock of this machine',
                variant='as stamped, plus the offset that LSL has measured, on the straight line '
@@ -86,7 +87,7 @@ def _add_channels(run: Run, recorded: RecordedStream, channels: list[str],
         'run': run.id, 'stream': recorded.id, 'channel': channels, 'unit': list(stream.units),
         'type': stream.type, 'source_id': stream.source_id, 'host': stream.host,
         'rate': stream.rate_hz or None, 'samples': len(recorded.sent_s), 'gaps': stream.gaps,
-        'clock_drift': recorded.drift})
+        'clock_drift': None if math.isnan(recorded.drift) else recorded.drift})
 
 
 def _add_samples(run: Run, recorded: RecordedStream, channels: list[str],
