@@ -62,7 +62,7 @@ def test_tables_have_every_sample_on_the_runs_clock(bag: Path) -> None:
     assert pd.isna(channels.loc[('Notes', 'text'), ['rate', 'clock_drift']]).all()
     # Missing, not infinite: there was one measurement.
     assert tables['instrument_channels']['clock_drift'].null_count == 1
-    assert channels.loc[('Heart', 'lead 2'), 'clock_drift'] == pytest.approx(DRIFT, rel=1e-3)
+    assert channels.loc[('Heart', 'lead 2'), 'clock_drift'] == pytest.approx(DRIFT, abs=3e-5)
 
 
 def test_a_sample_belongs_to_one_run(recorder: Any, result: OfflineResult, tmp_path: Path) -> None:
