@@ -19,6 +19,7 @@ import yaml
 PLAYED = {'humans': [], 'avs': [{'id': 'av0', 'planner': 'idm'}], 'seed': 1,
           'traffic': {'recorded': 'reactive', 'agents': 10}}
 
+
 def undone(states: NDArray[np.float64], place: Placement) -> NDArray[np.float64]:
     """Return x, y, yaw and speed (..., 4) of states (..., 8) in the map as it was."""
     positions = (states[..., :2] - place.offset) @ place.turned
