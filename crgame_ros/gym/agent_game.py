@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A game from the view of its agents: observations, rewards and the end of episodes."""
 
+from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
@@ -9,21 +10,32 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from crgame_ros.analysis.criticality.criticality import Criticality
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, PlanningError
 from crgame_ros.game.game import Game
 from crgame_ros.gym.driving_game import AgentSeat, DrivingGame
-from crgame_ros.gym.episode_setups import chosen_game, EpisodeSetups, StartVariation
+from crgame_ros.gym.episode_options import EpisodeOptions, read_options, Start
+from crgame_ros.gym.episode_setups import EpisodeSetups, StartVariation
 from crgame_ros.gym.reward import Decision, GoalWatch, Reward, USUAL_REWARD
+from crgame_ros.gym.scenes import (
+    adapted,
+    folder_scenes,
+    one_scene,
+    Scenes,
+    SceneSetups,
+    TEST_SHARE,
+)
 from crgame_ros.policy.actions import ACTION_KINDS, ActionKind
 from crgame_ros.policy.observation import Observation, Observed
 from crgame_ros.policy.observation_spec import ObservationSpec
 from crgame_ros.schema.reading import read
-from crgame_ros.simulation.offline import DEFAULT_DURATION_S, observed_run
+from crgame_ros.simulation.offline import observed_run
 from crgame_ros.simulation.setup import AvSetup
 import numpy as np
 from numpy.typing import NDArray
 
 ENDS = ('collision', 'off_road', 'goal')
+# Games of an environment that stay in memory.
+_KEPT = 8
 
 
 @dataclass(frozen=True)
@@ -31,24 +43,24 @@ class Experiment:
     """
     The settings that all episodes of an environment share; see `docs/gym.md`.
 
-    :param setups: setups of the episodes.
+    :param setups: setups of the scenes.
     :param seats: seats of the agents.
     :param action: kind of the actions.
     :param observation: content of the observations.
     :param reward: terms of the reward.
     :param ends: events that terminate an episode.
     :param ticks: number of scenario steps for which an action holds.
-    :param duration_s: simulated time after which an episode is truncated [s]
+    :param difficulty: of episodes whose options have none; None is the game as it is.
     """
 
-    setups: EpisodeSetups
+    setups: SceneSetups
     seats: tuple[str, ...]
     action: ActionKind
     observation: ObservationSpec
     reward: Reward
     ends: tuple[str, ...]
     ticks: int
-    duration_s: float
+    difficulty: float | None
 
 
 def make_experiment(
@@ -58,6 +70,8 @@ def make_experiment(
     ends: Sequence[str] = ENDS, duration: float | None = None, ticks: int = 1,
     drivers: Mapping[str, str] | None = None, planners: Mapping[str, str] | None = None,
     vary: Mapping[str, float] | None = None, worlds: int | None = None,
+    scenes: Path | str | None = None, split: str = 'all', test_share: float = TEST_SHARE,
+    difficulty: float | None = None,
 ) -> Experiment:
     """
     Build an experiment from the keywords of an environment, and check these.
@@ -65,6 +79,10 @@ def make_experiment(
     :param seats: ids of the vehicles that agents drive.
     :param vary: keys of `StartVariation`.
     :param worlds: as for `EpisodeSetups`.
+    :param scenes: folder of scenes, in place of a game or a scenario.
+    :param split: which of its scenes: `train`, `test` or `all`.
+    :param test_share: as for `is_for_test`.
+    :param difficulty: as for `EpisodeOptions`.
     :raises InputError: if a keyword is wrong, or the game cannot be used.
     """
     if action not in ACTION_KINDS:
@@ -73,13 +91,31 @@ def make_experiment(
     for end in ends:
         if end not in ENDS:
             raise InputError(f'there is no end "{end}"', 'environment', 'use ' + ', '.join(ENDS))
-    chosen = chosen_game(game, scenario, seats, drivers or {}, planners or {}, duration)
-    setups = EpisodeSetups(chosen, read(StartVariation, dict(vary or {}), 'vary'), worlds)
+    if duration is not None and not 0.0 < duration < math.inf:
+        raise InputError(f'"duration" is {duration}', 'environment',
+                         'give a positive number of seconds')
+    if sum(item is not None for item in (game, scenario, scenes)) != 1:
+        raise InputError('name a game or a scenario or a folder of scenes, one of them',
+                         'environment', "such as game='cut_in'")
+    if difficulty is not None:
+        difficulty = read_options({'difficulty': difficulty}).difficulty
+    chosen = one_scene(game, scenario, seats) if scenes is None else folder_scenes(
+        scenes, split, test_share, seats)
+    drivers, planners = dict(drivers or {}), dict(planners or {})
+
+    def load(name: str) -> Game:
+        try:
+            return adapted(chosen.load(name), drivers, planners, duration)
+        except InputError as error:
+            if scenes is None:
+                raise
+            raise InputError(error.what, f'{name}: {error.where}', error.remedy) from error
+
     return Experiment(
-        setups, tuple(seats), action,
-        read(ObservationSpec, dict(observation or {}), 'observation'),
-        Reward(USUAL_REWARD if reward is None else reward), tuple(ends), ticks,
-        DEFAULT_DURATION_S if math.isinf(chosen.duration) else chosen.duration)
+        SceneSetups(Scenes(chosen.names, load),
+                    read(StartVariation, dict(vary or {}), 'vary'), worlds),
+        tuple(seats), action, read(ObservationSpec, dict(observation or {}), 'observation'),
+        Reward(USUAL_REWARD if reward is None else reward), tuple(ends), ticks, difficulty)
 
 
 class AgentOutcome(NamedTuple):
@@ -101,13 +137,14 @@ class AgentGame:
     One game and its agents.
 
     :param experiment: settings that its episodes share.
+    :param setups: setups of its episodes.
+    :param scene: name of its scene.
     :ivar game: the game, which moves all vehicles and objects.
     """
 
-    def __init__(self, experiment: Experiment) -> None:
-        self.experiment = experiment
-        self.game = DrivingGame(experiment.setups, experiment.seats, experiment.action,
-                                experiment.ticks)
+    def __init__(self, experiment: Experiment, setups: EpisodeSetups, scene: str) -> None:
+        self.experiment, self.setups, self.scene = experiment, setups, scene
+        self.game = DrivingGame(setups, experiment.seats, experiment.action, experiment.ticks)
         self._observations = [
             Observation(experiment.observation, seat.vehicle.vehicle, seat.view.things)
             for seat in self.game.seats]
@@ -121,11 +158,12 @@ class AgentGame:
         """Return the agents' seats."""
         return self.game.seats
 
-    def begin(self, seed: int) -> None:
-        """Begin an episode."""
+    def begin(self, seed: int, start: Start | None = None, difficulty: float = 1.0) -> None:
+        """Begin an episode (`DrivingGame.begin`)."""
         if self.experiment.reward.is_measured:
             self._criticality = Criticality(observed_run(self.game.setup))
-        self.game.begin(seed, [] if self._criticality is None else [self._criticality])
+        self.game.begin(seed, [] if self._criticality is None else [self._criticality], start,
+                        difficulty)
 
     def act(self, actions: Mapping[str, Any]) -> None:
         """Advance to the next decision (`DrivingGame.act`)."""
@@ -133,8 +171,16 @@ class AgentGame:
 
     def observed(self, number: int) -> Observed:
         """Return an agent's observation, by part."""
-        seen = observe_together(self._observations[number], [self.seats[number]])
+        seen = self.observe(number, [self.seats[number]])
         return {part: values[0] for part, values in seen.items()}
+
+    def observe(self, number: int, seats: Sequence[AgentSeat]) -> Observed:
+        """Return the observations of an agent in several games like this, (B, …) by part."""
+        poses: NDArray[np.float64] = np.stack([seat.around.poses for seat in seats])
+        velocities = np.stack([seat.around.velocities for seat in seats])
+        return self._observations[number].observe(
+            [seat.state for seat in seats], [seat.place for seat in seats],
+            [seat.guide for seat in seats], poses, velocities)
 
     def outcomes(self) -> list[AgentOutcome]:
         """Return the outcome of the last decision for each agent."""
@@ -143,7 +189,8 @@ class AgentGame:
 
     def info(self) -> dict[str, object]:
         """Return information on the start of the episode."""
-        return {'time_s': self.game.time_s, 'seed': self.game.setup.game.seed}
+        return {'time_s': self.game.time_s, 'seed': self.game.setup.game.seed,
+                'scene': self.scene}
 
     def _outcome(self, seat: AgentSeat, off_road: bool) -> AgentOutcome:
         game, experiment = self.game, self.experiment
@@ -162,12 +209,60 @@ class AgentGame:
         info = {'time_s': time_s, **happened, 'hit': ','.join(seat.hit), 'terms': terms}
         if seat.refusal is not None:
             info['refusal'] = seat.refusal
-        return AgentOutcome(reward, terminated, time_s >= experiment.duration_s - 1e-9, info)
+        return AgentOutcome(reward, terminated, time_s >= self.setups.duration_s - 1e-9, info)
 
 
-def observe_together(observation: Observation, seats: Sequence[AgentSeat]) -> Observed:
-    """Return the observations of the agents of several games, (B, …) by part."""
-    poses: NDArray[np.float64] = np.stack([seat.around.poses for seat in seats])
-    velocities = np.stack([seat.around.velocities for seat in seats])
-    return observation.observe([seat.state for seat in seats], [seat.place for seat in seats],
-                               [seat.guide for seat in seats], poses, velocities)
+class Episodes:
+    """
+    The episodes of one environment, each in the game of its scene and difficulty.
+
+    The games used last are kept.
+
+    :param experiment: settings that the episodes share.
+    :ivar agent: the game of the present episode; before the first one, that of the first scene.
+    """
+
+    def __init__(self, experiment: Experiment) -> None:
+        self.experiment = experiment
+        self._games: OrderedDict[EpisodeSetups, AgentGame] = OrderedDict()
+        self.agent = self._game(experiment.setups.scenes.names[0], None, 0)
+
+    def begin(self, seed: int, options: EpisodeOptions) -> AgentGame:
+        """
+        Begin an episode; equal seeds and options give equal episodes.
+
+        :raises InputError: if there is no such scene, or its file cannot be used.
+        """
+        scenes, difficulty = self.experiment.setups.scenes, options.difficulty
+        if options.scene is not None:
+            scenes.check(options.scene)
+        if difficulty is None:
+            difficulty = self.experiment.difficulty
+        self.agent = self._game(options.scene or scenes.pick(seed), difficulty, seed)
+        self.agent.begin(seed, options.start, 1.0 if difficulty is None else difficulty)
+        return self.agent
+
+    def _game(self, scene: str, difficulty: float | None, seed: int) -> AgentGame:
+        setups = self.experiment.setups.of(scene, difficulty, seed)
+        if setups not in self._games:
+            try:
+                self._games[setups] = AgentGame(self.experiment, setups, scene)
+            except PlanningError as error:
+                raise InputError(str(error), scene, 'move it out of the scenes') from error
+            if len(self._games) > _KEPT:
+                self._games.popitem(last=False)
+        self._games.move_to_end(setups)
+        return self._games[setups]
+
+
+def observed_together(games: Sequence[AgentGame]) -> Observed:
+    """
+    Return the observations of the first agents of several games, (B, …) by part.
+
+    Those of games with the same setups are computed at once.
+    """
+    first = games[0]
+    if all(game.setups is first.setups for game in games):
+        return first.observe(0, [game.seats[0] for game in games])
+    seen = [game.observed(0) for game in games]
+    return {part: np.stack([each[part] for each in seen]) for part in seen[0]}

@@ -5,8 +5,9 @@
 from typing import Any, ClassVar, TYPE_CHECKING
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.gym.agent_game import AgentGame, make_experiment
+from crgame_ros.gym.agent_game import AgentGame, Episodes, make_experiment
 from crgame_ros.gym.agent_spaces import action_space, observation_space
+from crgame_ros.gym.episode_options import read_options
 from crgame_ros.gym.episode_setups import SEEDS
 from crgame_ros.gym.scene_painter import FRAMES_PER_S, ScenePainter
 import gymnasium
@@ -27,7 +28,8 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
     :param seat: id of the agent's vehicle: a human's (hv0, …) or an AV (av0, …).
     :param render_mode: `rgb_array` draws a picture, `human` shows the cockpit's page.
     :param keywords: those of `make_experiment`: game or scenario, action, observation, reward,
-        ends, duration, ticks, drivers, planners, vary, worlds.
+        ends, duration, ticks, drivers, planners, vary, worlds, difficulty; or, in place of a game,
+        scenes, split and test_share.
     :raises InputError: if a keyword is wrong.
     """
 
@@ -39,24 +41,31 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         check_render_mode(render_mode, self.metadata['render_modes'])
         self.experiment = make_experiment((seat,), **keywords)
         self.render_mode = render_mode
-        self.agent = AgentGame(self.experiment)
+        self._episodes = Episodes(self.experiment)
         self.observation_space: spaces.Dict = observation_space(  # type: ignore[assignment]
             self.experiment.observation)
         self.action_space: spaces.Box = action_space(  # type: ignore[assignment]
             self.experiment.action)
-        self._painter: ScenePainter | None = None
+        self._painter: tuple[AgentGame, ScenePainter] | None = None
         self._viewer: PageViewer | None = None
         self._begun = False
+
+    @property
+    def agent(self) -> AgentGame:
+        """Return the game of the present episode."""
+        return self._episodes.agent
 
     def reset(self, *, seed: int | None = None,
               options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """
         Begin an episode; equal seeds and equal actions give equal episodes.
 
-        :param options: ignored.
+        :param options: keys of `EpisodeOptions`: scene, start, difficulty.
+        :raises InputError: if an option is unknown or wrong.
         """
+        wanted = read_options(options)
         super().reset(seed=seed)
-        self.agent.begin(int(self.np_random.integers(SEEDS)))
+        self._episodes.begin(int(self.np_random.integers(SEEDS)), wanted)
         self._begun = True
         if self.render_mode == 'human':
             self._show(begin=True)
@@ -82,9 +91,9 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         self._need_begun()
         if self.render_mode != 'rgb_array':
             return None
-        if self._painter is None:
-            self._painter = ScenePainter(self.agent.game.setup)
-        return self._painter.paint(self.agent.game)
+        if self._painter is None or self._painter[0] is not self.agent:
+            self._painter = self.agent, ScenePainter(self.agent.game.setup)
+        return self._painter[1].paint(self.agent.game)
 
     def close(self) -> None:
         """Stop the page's server, if there is one."""

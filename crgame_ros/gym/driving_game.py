@@ -15,6 +15,7 @@ from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.outline import Footprint, Primitive
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.gym.av_pilot import AvPilot, stacked
+from crgame_ros.gym.episode_options import Start
 from crgame_ros.gym.episode_setups import EpisodeSetups
 from crgame_ros.planner.road_limit import TOLERANCE
 from crgame_ros.policy.actions import (
@@ -230,13 +231,17 @@ class DrivingGame:
         """Return the simulated time since the start [s]."""
         return self.simulation.n * self.simulation.scheduler.dt_s
 
-    def begin(self, seed: int, observers: Sequence[RunObserver] = ()) -> None:
+    def begin(self, seed: int, observers: Sequence[RunObserver] = (), start: Start | None = None,
+              difficulty: float = 1.0) -> None:
         """
         Begin an episode.
 
         :param observers: observers of its ticks.
+        :param start: stated start, in place of one that varies.
+        :param difficulty: share of the start's variation that is used.
         """
-        self.setup = setup = self._setups.make(seed, {item.id: item.guide for item in self.seats})
+        self.setup = setup = self._setups.make(
+            seed, {item.id: item.guide for item in self.seats}, start, difficulty)
         self.simulation = Simulation(setup)
         self._observers = observers
         agents = {item.row for item in self.seats}

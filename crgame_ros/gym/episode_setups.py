@@ -2,23 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """The setups of a game's episodes: the effects of a seed, and variations of the start."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from pathlib import Path
+import math
 from typing import Annotated, ClassVar, TypeVar
 
 from crgame_ros.drivability.monitor import road_transforms
 from crgame_ros.errors import InputError
 from crgame_ros.game.driven_vehicle import DrivenHuman
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import Game, HumanSpec
+from crgame_ros.game.game import Game
 from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.library.lookup import find_scenario
-from crgame_ros.paths import scenarios_directory
+from crgame_ros.gym.episode_options import Start
 from crgame_ros.policy.route_guide import RouteGuide
+from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Within
+from crgame_ros.simulation.offline import DEFAULT_DURATION_S
 from crgame_ros.simulation.setup import AvSetup, build_setup, Setup
 from crgame_ros.simulation.traffic_setup import TrafficSetup
 from crgame_ros.vehicle.state import VehicleState
@@ -52,29 +52,43 @@ class EpisodeSetups:
     :param vary: variation of the start.
     :param worlds: number of traffic placements that the seeds share; None makes one for each
         seed, which takes 0.1 s and more.
+    :param loaded: scenario of the game, if it is loaded already.
     """
 
-    def __init__(self, game: Game, vary: StartVariation, worlds: int | None = None) -> None:
+    def __init__(self, game: Game, vary: StartVariation, worlds: int | None = None,
+                 loaded: LoadedScenario | None = None) -> None:
         if worlds is not None and not worlds >= 1:
             raise InputError(f'"worlds" is {worlds}', 'environment', 'give a number from 1')
-        self.base = build_setup(game)
+        self.base = build_setup(game, loaded)
         self._vary, self._worlds = vary, worlds
         self._placed: dict[int, Setup] = {}
 
-    def make(self, seed: int, guides: Mapping[str, RouteGuide]) -> Setup:
+    @property
+    def duration_s(self) -> float:
+        """Return the simulated time after which an episode is truncated [s]."""
+        duration = self.base.game.duration
+        return DEFAULT_DURATION_S if math.isinf(duration) else duration
+
+    def make(self, seed: int, guides: Mapping[str, RouteGuide], start: Start | None = None,
+             difficulty: float = 1.0) -> Setup:
         """
         Return the setup of an episode; equal seeds give equal setups.
 
         :param guides: routes of the vehicles whose start varies, by id.
+        :param start: stated start, in place of one that varies.
+        :param difficulty: share of the variation that is used.
         """
         setup = self.base
         if setup.traffic is not None:
             setup = self._with_traffic(seed)
         setup = replace(setup, game=replace(setup.game, seed=seed))
-        if self._vary == StartVariation():
+        if start is None and self._vary == StartVariation():
             return setup
         random = np.random.Generator(np.random.PCG64(seed))
-        drawn = {vehicle: random.uniform(-1.0, 1.0, 2).tolist() for vehicle in guides}
+        most = difficulty * self._vary.speed, difficulty * self._vary.along
+        changes = {vehicle: (start.speed, start.along) if start is not None else tuple(
+            share * size for share, size in zip(random.uniform(-1.0, 1.0, 2).tolist(), most,
+                                                strict=True)) for vehicle in guides}
         transforms = dict(zip(setup.vehicle_ids, road_transforms(
             len(setup.humans), [av.transform for av in setup.avs]), strict=True))
 
@@ -82,21 +96,21 @@ class EpisodeSetups:
             if vehicle.id not in guides:
                 return vehicle
             return replace(vehicle, state=self._moved(
-                vehicle.state, guides[vehicle.id], transforms[vehicle.id], *drawn[vehicle.id]))
+                vehicle.state, guides[vehicle.id], transforms[vehicle.id], *changes[vehicle.id]))
 
         return replace(setup, humans=tuple(map(varied, setup.humans)),
                        avs=tuple(map(varied, setup.avs)))
 
     def _moved(self, state: VehicleState, guide: RouteGuide, transform: RigidTransform,
-               speed_share: float, along_share: float) -> VehicleState:
-        """Return a start that is varied by shares in [-1, 1] of the largest changes."""
-        speed = max(0.0, state.speed + speed_share * self._vary.speed)
-        if not self._vary.along:
+               faster: float, along: float) -> VehicleState:
+        """Return a start with another speed [m/s], shifted along the route [m]."""
+        speed = max(0.0, state.speed + faster)
+        if not along:
             return state._replace(speed=speed)
         x, y, yaw = transform.to_scenario(np.array(state[:3])).tolist()
         path, s = guide.driving.path, guide.driving.start_s
         s, d, heading = path.locate(x, y, s)
-        moved = path.poses(np.array([s + along_share * self._vary.along]), np.array([d]))[0]
+        moved = path.poses(np.array([s + along]), np.array([d]))[0]
         moved[2] += yaw - heading
         x, y, yaw = transform.to_simulation(moved).tolist()
         return state._replace(x=x, y=y, yaw=yaw, speed=speed)
@@ -117,59 +131,3 @@ class EpisodeSetups:
                 placed.traffic.descriptions, lambda: deepcopy(fresh)))
             self._placed[world] = placed
         return placed
-
-
-def chosen_game(game: Game | Path | str | None, scenario: Path | str | None,
-                seats: Sequence[str], drivers: Mapping[str, str], planners: Mapping[str, str],
-                duration: float | None) -> Game:
-    """
-    Return the game of an environment.
-
-    :param game: a game, its file, or the name of a shipped one, such as `cut_in`.
-    :param scenario: a CommonRoad file, or a benchmark id, instead: each planning problem is an
-        AV, and the only humans are agents.
-    :param seats: seats of the agents.
-    :param drivers: driver sources that replace the game's, by human.
-    :param planners: planners that replace the game's, by AV.
-    :param duration: time until an episode is truncated, instead of the game's [s]
-    :raises InputError: if neither game nor scenario is given, or both are.
-    """
-    if (game is None) == (scenario is None):
-        raise InputError('name a game or a scenario, one of them', 'environment',
-                         "such as game='cut_in'")
-    if scenario is not None:
-        chosen = Game(find_scenario(Path(scenario).expanduser()), humans=tuple(
-            HumanSpec(seat, 'idle') for seat in seats if seat.startswith('hv')))
-    elif isinstance(game, Game):
-        chosen = game
-    else:
-        assert game is not None
-        chosen = load_game(_file(game))
-    chosen = replace(chosen, humans=tuple(
-        replace(human, driver=drivers.get(human.id, human.driver)) for human in chosen.humans))
-    if planners:
-        if chosen.avs is None:
-            raise InputError('the game does not list its AVs', 'planners',
-                             'list them in a game file')
-        chosen = replace(chosen, avs=tuple(
-            replace(av, planner=planners[av.id], options={}) if av.id in planners else av
-            for av in chosen.avs))
-    known = {human.id for human in chosen.humans} | {av.id for av in chosen.avs or ()}
-    for name in (*drivers, *planners):
-        if name not in known:
-            raise InputError(f'there is no "{name}" in the game', 'drivers or planners',
-                             'use ' + ', '.join(sorted(known)))
-    if duration is not None:
-        if not 0.0 < duration < float('inf'):
-            raise InputError(f'"duration" is {duration}', 'environment',
-                             'give a positive number of seconds')
-        chosen = replace(chosen, duration=float(duration))
-    return chosen
-
-
-def _file(game: Path | str) -> Path:
-    """Return the file of a game; a shipped one is found by its name."""
-    shipped = scenarios_directory() / f'{game}.yaml'
-    if isinstance(game, str) and '/' not in game and shipped.is_file():
-        return shipped
-    return Path(game).expanduser()

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from crgame_ros.errors import InputError
-from crgame_ros.gym.agent_game import AgentGame, make_experiment, observe_together
+from crgame_ros.gym.agent_game import AgentGame, Episodes, make_experiment, observed_together
 from crgame_ros.gym.agent_spaces import action_space, observation_space
 from crgame_ros.gym.driving_env import check_render_mode, Seen
-from crgame_ros.gym.episode_setups import SEEDS
+from crgame_ros.gym.episode_options import EpisodeOptions, read_options
+from crgame_ros.gym.episode_setups import EpisodeSetups, SEEDS
 from crgame_ros.gym.scene_painter import FRAMES_PER_S, ScenePainter
-from crgame_ros.policy.observation import Observation
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -46,17 +46,14 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
             raise InputError(f'"num_envs" is {num_envs}', 'environment', 'give a number from 1')
         self.num_envs, self.render_mode = num_envs, render_mode
         self.experiment = make_experiment((seat,), **keywords)
-        self._games = [AgentGame(self.experiment) for _ in range(num_envs)]
-        agent = self._games[0].seats[0]
-        self._observation = Observation(
-            self.experiment.observation, agent.vehicle.vehicle, agent.view.things)
+        self._episodes = [Episodes(self.experiment) for _ in range(num_envs)]
         self.single_observation_space = observation_space(self.experiment.observation)
         self.single_action_space = action_space(self.experiment.action)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._randoms = [seeding.np_random()[0] for _ in range(num_envs)]
         self._over = np.zeros(num_envs, dtype=bool)
-        self._painter: ScenePainter | None = None
+        self._painters: dict[EpisodeSetups, ScenePainter] = {}
 
     def reset(self, *, seed: int | Sequence[int | None] | None = None,
               options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, object]]:
@@ -65,7 +62,11 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
 
         :param seed: seed of the first game, which increases by 1 for each next game; or one seed
             for each.
+        :param options: keys of `EpisodeOptions`, for every game: scene, start, difficulty. Games
+            that begin anew in `step` have none.
+        :raises InputError: if an option is unknown or wrong.
         """
+        wanted = read_options(options)
         seeds: Sequence[int | None]
         if seed is None or isinstance(seed, int):
             seeds = [None if seed is None else seed + i for i in range(self.num_envs)]
@@ -75,7 +76,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         for index, own in enumerate(seeds):
             if own is not None:
                 self._randoms[index] = seeding.np_random(own)[0]
-            infos = self._begin(index, infos)
+            infos = self._begin(index, infos, wanted)
         self._over[:] = False
         return self._seen(), infos
 
@@ -88,7 +89,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         infos: dict[str, object] = {}
         for index, game in enumerate(self._games):
             if begun[index]:
-                infos = self._begin(index, infos)
+                infos = self._begin(index, infos, EpisodeOptions())
                 continue
             game.act({game.seats[0].id: actions[index]})
             outcome = game.outcomes()[0]
@@ -101,14 +102,25 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         """Return a picture of each game in the mode `rgb_array`."""
         if self.render_mode is None:
             return None
-        if self._painter is None:
-            self._painter = ScenePainter(self._games[0].game.setup)
-        return tuple(self._painter.paint(game.game) for game in self._games)
+        return tuple(self._paint(game) for game in self._games)
 
-    def _begin(self, index: int, infos: dict[str, object]) -> dict[str, object]:
-        game = self._games[index]
-        game.begin(int(self._randoms[index].integers(SEEDS)))
+    @property
+    def _games(self) -> list[AgentGame]:
+        return [episodes.agent for episodes in self._episodes]
+
+    def _paint(self, game: AgentGame) -> NDArray[np.uint8]:
+        if game.setups not in self._painters:
+            # No more roads stay in memory than there are games.
+            present = {item.setups for item in self._games}
+            self._painters = {setups: painter for setups, painter in self._painters.items()
+                              if setups in present}
+            self._painters[game.setups] = ScenePainter(game.game.setup)
+        return self._painters[game.setups].paint(game.game)
+
+    def _begin(self, index: int, infos: dict[str, object],
+               options: EpisodeOptions) -> dict[str, object]:
+        game = self._episodes[index].begin(int(self._randoms[index].integers(SEEDS)), options)
         return self._add_info(infos, game.info(), index)
 
     def _seen(self) -> Seen:
-        return observe_together(self._observation, [game.seats[0] for game in self._games])
+        return observed_together(self._games)

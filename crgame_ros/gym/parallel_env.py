@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from crgame_ros.errors import InputError
-from crgame_ros.gym.agent_game import AgentGame, make_experiment
+from crgame_ros.gym.agent_game import AgentGame, Episodes, make_experiment
 from crgame_ros.gym.agent_spaces import action_space, observation_space
 from crgame_ros.gym.driving_env import check_render_mode, Seen
+from crgame_ros.gym.episode_options import read_options
 from crgame_ros.gym.episode_setups import SEEDS
 from crgame_ros.gym.scene_painter import FRAMES_PER_S, ScenePainter
 from crgame_ros.paths import extra_install
@@ -44,7 +45,8 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
                  **keywords: Any) -> None:
         check_render_mode(render_mode, self.metadata['render_modes'])
         if seats is None:
-            seats = make_experiment((), **keywords).setups.base.vehicle_ids
+            # Without seats of agents, a game has those of its file.
+            seats = Episodes(make_experiment((), **keywords)).agent.setups.base.vehicle_ids
         if not seats or len(set(seats)) < len(seats):
             raise InputError(f'"seats" are {list(seats)}', 'environment',
                              'name each vehicle once, and one at least')
@@ -52,12 +54,12 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
         self.render_mode = render_mode
         self.possible_agents = list(seats)
         self.agents: list[str] = []
-        self._together = AgentGame(self.experiment)
+        self._episodes = Episodes(self.experiment)
         self.observation_spaces = {
             seat: observation_space(self.experiment.observation) for seat in seats}
         self.action_spaces = {seat: action_space(self.experiment.action) for seat in seats}
         self._random = np.random.Generator(np.random.PCG64())
-        self._painter: ScenePainter | None = None
+        self._painter: tuple[AgentGame, ScenePainter] | None = None
 
     def observation_space(self, agent: str) -> spaces.Dict:
         """Return the space of an agent's observations."""
@@ -67,12 +69,22 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
         """Return the space of an agent's actions."""
         return self.action_spaces[agent]
 
+    @property
+    def _together(self) -> AgentGame:
+        return self._episodes.agent
+
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None
               ) -> tuple[dict[str, Seen], dict[str, dict[str, object]]]:
-        """Begin an episode; equal seeds and equal actions give equal episodes."""
+        """
+        Begin an episode; equal seeds and equal actions give equal episodes.
+
+        :param options: keys of `EpisodeOptions`: scene, start, difficulty.
+        :raises InputError: if an option is unknown or wrong.
+        """
+        wanted = read_options(options)
         if seed is not None:
             self._random = np.random.Generator(np.random.PCG64(seed))
-        self._together.begin(int(self._random.integers(SEEDS)))
+        self._episodes.begin(int(self._random.integers(SEEDS)), wanted)
         self.agents = list(self.possible_agents)
         return self._seen(), {agent: self._together.info() for agent in self.agents}
 
@@ -105,9 +117,9 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
         """Return a picture (H, W, 3) around the first agent in the mode `rgb_array`."""
         if self.render_mode is None:
             return None
-        if self._painter is None:
-            self._painter = ScenePainter(self._together.game.setup)
-        return self._painter.paint(self._together.game)
+        if self._painter is None or self._painter[0] is not self._together:
+            self._painter = self._together, ScenePainter(self._together.game.setup)
+        return self._painter[1].paint(self._together.game)
 
     def _seen(self) -> dict[str, Seen]:
         return {agent: self._together.observed(number)

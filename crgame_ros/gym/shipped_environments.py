@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The ids of the environments: one for each shipped game, and one for any other game."""
+"""The ids of the environments: one for each shipped game, one for any other, one for folders."""
 
 from crgame_ros.paths import scenarios_directory
 import gymnasium
 
 NAMESPACE = 'crgame'
 ANY_GAME = f'{NAMESPACE}/Game-v0'
+# With the keyword `scenes`.
+FOLDER = f'{NAMESPACE}/Scenes-v0'
 _ENTRY = 'crgame_ros.gym.driving_env:DrivingEnv'
 _VECTOR_ENTRY = 'crgame_ros.gym.games_together:GamesTogether'
 
@@ -25,8 +27,8 @@ def environment_id(game: str) -> str:
 
 def register_all() -> None:
     """Register every environment with Gymnasium, unless it is registered already."""
-    for name, keywords in ((ANY_GAME, {}), *((environment_id(game), {'game': game})
-                                             for game in shipped_games())):
+    shipped = {environment_id(game): {'game': game} for game in shipped_games()}
+    for name, keywords in {ANY_GAME: {}, FOLDER: {}, **shipped}.items():
         if name not in gymnasium.registry:
             gymnasium.register(name, entry_point=_ENTRY, vector_entry_point=_VECTOR_ENTRY,
                                kwargs=keywords)

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 import subprocess
 import sys
+from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.gym.driving_env import DrivingEnv
@@ -31,11 +32,21 @@ def test_gymnasium_accepts_every_environment(game: str) -> None:
     check_env(gymnasium.make(environment_id(game), worlds=1).unwrapped, skip_render_check=True)
 
 
+class WithoutOptions(ParallelDrivingEnv):
+    """An environment for PettingZoo's checker, which resets with `{'options': 1}`."""
+
+    def reset(self, seed: int | None = None,
+              options: object = None) -> tuple[dict[str, Any], dict[str, dict[str, object]]]:
+        """Reset, if the options are those of the checker."""
+        assert options in (None, {'options': 1})
+        return super().reset(seed)
+
+
 @pytest.mark.matrix('two_avs')
 @pytest.mark.slow
 @pytest.mark.parametrize('game', shipped_games())
 def test_pettingzoo_accepts_every_game_with_all_its_seats(game: str) -> None:
-    parallel_api_test(ParallelDrivingEnv(game=game, duration=1.0, worlds=1), num_cycles=12)
+    parallel_api_test(WithoutOptions(game=game, duration=1.0, worlds=1), num_cycles=12)
 
 
 @pytest.mark.slow
