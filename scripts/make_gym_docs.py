@@ -25,7 +25,7 @@ DOCUMENT = Path(__file__).resolve().parent.parent / 'docs' / 'gym.md'
 
 def observations() -> str:
     """Return the columns of each part."""
-    lines = ['| part | number | unit | what | bounds |', '|---|---|---|---|---|']
+    lines = ['| part | number | unit | what | bounds | 1 if scaled |', '|---|---|---|---|---|---|']
     for part, columns in (('state', STATE_COLUMNS), ('route', ROUTE_COLUMNS),
                           ('objects', OBJECT_COLUMNS)):
         lines += [_column(part, index, column) for index, column in enumerate(columns)]
@@ -34,7 +34,13 @@ def observations() -> str:
 
 def _column(part: str, index: int, column: ObservedColumn) -> str:
     return (f'| `{part}` | {index} `{column.name}` | {column.unit} | {column.meaning} | '
-            f'{column.low:g} to {column.high:g} |')
+            f'{column.low:g} to {column.high:g} | {_one(part, column)} |')
+
+
+def _one(part: str, column: ObservedColumn) -> str:
+    if column.one is None:
+        return '`reach`' if part == 'objects' else 'length of the route ahead'
+    return f'{column.one:g}'
 
 
 def terms() -> str:

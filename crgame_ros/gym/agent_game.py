@@ -25,8 +25,8 @@ from crgame_ros.gym.scenes import (
     TEST_SHARE,
 )
 from crgame_ros.policy.actions import ACTION_KINDS, ActionKind
-from crgame_ros.policy.observation import Observation, Observed
-from crgame_ros.policy.observation_spec import ObservationSpec
+from crgame_ros.policy.observation import Observation, ObservationHistory, Observed
+from crgame_ros.policy.observation_spec import Depths, ObservationSpec
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.offline import observed_run
 from crgame_ros.simulation.setup import AvSetup
@@ -146,12 +146,20 @@ class AgentGame:
         self.experiment, self.setups, self.scene = experiment, setups, scene
         self.game = DrivingGame(setups, experiment.seats, experiment.action, experiment.ticks)
         self._observations = [
-            Observation(experiment.observation, seat.vehicle.vehicle, seat.view.things)
+            Observation(experiment.observation, seat.vehicle.vehicle, seat.view.things,
+                        setups.base.loaded.scenario)
             for seat in self.game.seats]
+        self._histories = [ObservationHistory(experiment.observation) for _ in self.game.seats]
         self._goals = {seat.id: GoalWatch(
             seat.vehicle.planning_problem if isinstance(seat.vehicle, AvSetup) else None,
             seat.vehicle.vehicle.rear_to_center) for seat in self.game.seats}
         self._criticality: Criticality | None = None
+
+    @property
+    def has_present_alone(self) -> bool:
+        """Return whether observations need neither a history nor a mask."""
+        return self.experiment.action != 'manoeuvre' and \
+            self.experiment.observation.history == Depths()
 
     @property
     def seats(self) -> list[AgentSeat]:
@@ -162,6 +170,8 @@ class AgentGame:
         """Begin an episode (`DrivingGame.begin`)."""
         if self.experiment.reward.is_measured:
             self._criticality = Criticality(observed_run(self.game.setup))
+        for history in self._histories:
+            history.begin()
         self.game.begin(seed, [] if self._criticality is None else [self._criticality], start,
                         difficulty)
 
@@ -170,27 +180,38 @@ class AgentGame:
         self.game.act(actions)
 
     def observed(self, number: int) -> Observed:
-        """Return an agent's observation, by part."""
+        """Return an agent's observation, by part, once for each decision."""
         seen = self.observe(number, [self.seats[number]])
-        return {part: values[0] for part, values in seen.items()}
+        return self.completed(number, {part: values[0] for part, values in seen.items()})
 
     def observe(self, number: int, seats: Sequence[AgentSeat]) -> Observed:
-        """Return the observations of an agent in several games like this, (B, …) by part."""
+        """
+        Return the present parts of the observations of an agent in several games like this.
+
+        :return: (B, …) by part
+        """
         poses: NDArray[np.float64] = np.stack([seat.around.poses for seat in seats])
         velocities = np.stack([seat.around.velocities for seat in seats])
         return self._observations[number].observe(
             [seat.state for seat in seats], [seat.place for seat in seats],
             [seat.guide for seat in seats], poses, velocities)
 
+    def completed(self, number: int, seen: Observed) -> Observed:
+        """Return an agent's observation with its history and the mask of its manoeuvres."""
+        whole = self._histories[number].add(seen)
+        if self.seats[number].manoeuvres is not None:
+            whole['mask'] = self.seats[number].mask.astype(np.float32)
+        return whole
+
     def outcomes(self) -> list[AgentOutcome]:
         """Return the outcome of the last decision for each agent."""
         return [self._outcome(seat, off) for seat, off in zip(
             self.seats, self.game.off_road(), strict=True)]
 
-    def info(self) -> dict[str, object]:
-        """Return information on the start of the episode."""
+    def info(self, number: int = 0) -> dict[str, object]:
+        """Return an agent's information on the start of the episode."""
         return {'time_s': self.game.time_s, 'seed': self.game.setup.game.seed,
-                'scene': self.scene}
+                'scene': self.scene, **_mask_info(self.seats[number])}
 
     def _outcome(self, seat: AgentSeat, off_road: bool) -> AgentOutcome:
         game, experiment = self.game, self.experiment
@@ -206,7 +227,8 @@ class AgentGame:
         happened = {'collision': collision, 'off_road': off_road, 'goal': goal}
         terminated = any(happened[end] for end in experiment.ends)
         time_s = game.time_s
-        info = {'time_s': time_s, **happened, 'hit': ','.join(seat.hit), 'terms': terms}
+        info = {'time_s': time_s, **happened, 'hit': ','.join(seat.hit), 'terms': terms,
+                **_mask_info(seat)}
         if seat.refusal is not None:
             info['refusal'] = seat.refusal
         return AgentOutcome(reward, terminated, time_s >= self.setups.duration_s - 1e-9, info)
@@ -262,7 +284,18 @@ def observed_together(games: Sequence[AgentGame]) -> Observed:
     Those of games with the same setups are computed at once.
     """
     first = games[0]
-    if all(game.setups is first.setups for game in games):
-        return first.observe(0, [game.seats[0] for game in games])
-    seen = [game.observed(0) for game in games]
+    if not all(game.setups is first.setups for game in games):
+        return _stacked([game.observed(0) for game in games])
+    seen = first.observe(0, [game.seats[0] for game in games])
+    if first.has_present_alone:
+        return seen
+    return _stacked([game.completed(0, {part: values[row] for part, values in seen.items()})
+                     for row, game in enumerate(games)])
+
+
+def _stacked(seen: Sequence[Observed]) -> Observed:
     return {part: np.stack([each[part] for each in seen]) for part in seen[0]}
+
+
+def _mask_info(seat: AgentSeat) -> dict[str, object]:
+    return {} if seat.manoeuvres is None else {'action_mask': seat.mask.astype(np.int8)}

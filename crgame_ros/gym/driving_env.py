@@ -10,6 +10,7 @@ from crgame_ros.gym.agent_spaces import action_space, observation_space
 from crgame_ros.gym.episode_options import read_options
 from crgame_ros.gym.episode_setups import SEEDS
 from crgame_ros.gym.scene_painter import FRAMES_PER_S, ScenePainter
+from crgame_ros.policy.observation_spec import Numbers
 import gymnasium
 from gymnasium import spaces
 import numpy as np
@@ -18,10 +19,10 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from crgame_ros.gym.page_viewer import PageViewer
 
-Seen = dict[str, NDArray[np.float32]]
+Seen = dict[str, Numbers]
 
 
-class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
+class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32] | np.int64]):
     """
     An environment in which an agent drives one vehicle; all others drive as in an offline run.
 
@@ -43,8 +44,8 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         self.render_mode = render_mode
         self._episodes = Episodes(self.experiment)
         self.observation_space: spaces.Dict = observation_space(  # type: ignore[assignment]
-            self.experiment.observation)
-        self.action_space: spaces.Box = action_space(  # type: ignore[assignment]
+            self.experiment.observation, self.experiment.action)
+        self.action_space: spaces.Box | spaces.Discrete = action_space(  # type: ignore[assignment]
             self.experiment.action)
         self._painter: tuple[AgentGame, ScenePainter] | None = None
         self._viewer: PageViewer | None = None
@@ -71,7 +72,7 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
             self._show(begin=True)
         return self.agent.observed(0), self.agent.info()
 
-    def step(self, action: NDArray[np.float32]
+    def step(self, action: NDArray[np.float32] | np.int64
              ) -> tuple[Seen, float, bool, bool, dict[str, object]]:
         """
         Drive until the next decision.
@@ -94,6 +95,18 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         if self._painter is None or self._painter[0] is not self.agent:
             self._painter = self.agent, ScenePainter(self.agent.game.setup)
         return self._painter[1].paint(self.agent.game)
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """
+        Return which manoeuvres there are, (5): the method that sb3-contrib calls.
+
+        :raises InputError: if the actions are no manoeuvres.
+        """
+        self._need_begun()
+        if self.agent.seats[0].manoeuvres is None:
+            raise InputError(f'actions "{self.experiment.action}" have no mask', 'environment',
+                             'use the action manoeuvre')
+        return self.agent.seats[0].mask
 
     def close(self) -> None:
         """Stop the page's server, if there is one."""

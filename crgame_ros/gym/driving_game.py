@@ -23,9 +23,11 @@ from crgame_ros.policy.actions import (
     checked_action,
     PedalInverse,
     pedals,
+    PLANNED_KINDS,
     planned_states,
     wanted_motion,
 )
+from crgame_ros.policy.manoeuvres import Manoeuvres
 from crgame_ros.policy.route_guide import RouteGuide, RoutePlace
 from crgame_ros.policy.seat_view import SeatView, Surrounded
 from crgame_ros.roads.boundary import RoadBoundary
@@ -138,6 +140,8 @@ class AgentSeat:
     :param view: view of the world from it.
     :param guide: guide along its route.
     :param inverse: inverse of its powertrain, from acceleration to pedals.
+    :param manoeuvres: its manoeuvres, if the actions are such.
+    :param mask: (5) which of them there are at this decision.
     :param pilot: pilot of an AV; None in a human's seat.
     :param around: surroundings at the last decision.
     :param place: place on the route at the last decision.
@@ -146,7 +150,7 @@ class AgentSeat:
     :param centers: (T, 3) its centres in the road's coordinates, at the steps since the last
         decision
     :param hit: ids of those that it has touched since then.
-    :param refusal: why the engine refused its plan; None if it did not.
+    :param refusal: why the engine refused its plan, or the manoeuvre is masked; None if neither.
     :param overhang: distance off the road at the start; it applies until the vehicle has been on
         the road [m]
     """
@@ -157,12 +161,14 @@ class AgentSeat:
     view: SeatView
     guide: RouteGuide
     inverse: PedalInverse
+    manoeuvres: Manoeuvres | None = None
     pilot: AvPilot | None = None
     around: Surrounded = field(init=False)
     place: RoutePlace = field(init=False)
     before: tuple[VehicleState, RoutePlace] = field(init=False)
     action: Array = field(init=False)
     centers: Array = field(init=False)
+    mask: NDArray[np.bool_] = field(init=False)
     hit: tuple[str, ...] = ()
     refusal: str | None = None
     overhang: float = 0.0
@@ -202,8 +208,8 @@ class DrivingGame:
                                  'take one of ' + ', '.join(ids) if ids else
                                  'add a human or an AV to the game')
             row = ids.index(name)
-            if row < len(setup.humans) and action == 'plan':
-                raise InputError('a human drives by pedals, not by plans', name,
+            if row < len(setup.humans) and action in PLANNED_KINDS:
+                raise InputError('a human drives by pedals, not by plans or manoeuvres', name,
                                  'choose the action acceleration or pedals, or an AV')
             vehicle = setup.vehicles[row]
             view = SeatView(row, driven, setup.obstacles.descriptions, transforms[row])
@@ -212,7 +218,9 @@ class DrivingGame:
             self.seats.append(AgentSeat(
                 name, row, vehicle, view,
                 RouteGuide(setup.loaded.scenario, problem, start, vehicle.vehicle),
-                PedalInverse(vehicle.vehicle)))
+                PedalInverse(vehicle.vehicle),
+                None if action != 'manoeuvre' else Manoeuvres(
+                    setup.loaded.scenario, problem, start, vehicle.vehicle)))
         self._observers: Sequence[RunObserver] = ()
         self.setup = setup
         self.road: RoadBoundary | None = None
@@ -269,6 +277,9 @@ class DrivingGame:
         for seat in self.seats:
             seat.place = seat.guide.follow(seat.state)
             seat.before = seat.state, seat.place
+            if seat.manoeuvres is not None:
+                seat.manoeuvres.restart(seat.state)
+                seat.mask = seat.manoeuvres.mask(seat.state)
             if self.road is not None:
                 state, vehicle = seat.view.own(states), seat.vehicle.vehicle
                 seat.overhang = self.road.overhang(
@@ -285,12 +296,16 @@ class DrivingGame:
             seat.action = checked_action(self._action, actions[seat.id])
             seat.before = seat.state, seat.place
             seat.hit, seat.refusal = (), None
+            if seat.manoeuvres is not None:
+                seat.refusal = seat.manoeuvres.decide(int(seat.action), seat.state)
         ways = [self._tick() for _ in range(self._ticks)]
         for seat in self.seats:
             poses = np.concatenate([way[:, seat.row] for way in ways])
             transform = self._transforms[seat.row]
             seat.centers = poses if transform.is_identity else transform.to_scenario(poses)
             seat.place = seat.guide.follow(seat.state)
+            if seat.manoeuvres is not None:
+                seat.mask = seat.manoeuvres.mask(seat.state)
 
     def off_road(self) -> list[bool]:
         """
@@ -351,9 +366,11 @@ class DrivingGame:
         for seat in self.seats:
             if seat.pilot is not None and (
                     self._action != 'pedals' or seat.pilot.perception is not None):
-                refusal = seat.pilot.offer(planned_states(
-                    self._action, seat.action, seat.state, seat.vehicle.vehicle,
-                    scheduler.time_step_s, scheduler.steps_per_tick))
+                refusal = seat.pilot.offer(
+                    seat.manoeuvres.plan(seat.state, scheduler.time_step_s) if seat.manoeuvres
+                    else planned_states(
+                        self._action, seat.action, seat.state, seat.vehicle.vehicle,
+                        scheduler.time_step_s, scheduler.steps_per_tick))
                 seat.refusal = seat.refusal or refusal
 
     def _commands(self, dt_s: float) -> list[DriverCommand | None]:

@@ -47,7 +47,8 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         self.num_envs, self.render_mode = num_envs, render_mode
         self.experiment = make_experiment((seat,), **keywords)
         self._episodes = [Episodes(self.experiment) for _ in range(num_envs)]
-        self.single_observation_space = observation_space(self.experiment.observation)
+        self.single_observation_space = observation_space(
+            self.experiment.observation, self.experiment.action)
         self.single_action_space = action_space(self.experiment.action)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)

@@ -56,7 +56,8 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
         self.agents: list[str] = []
         self._episodes = Episodes(self.experiment)
         self.observation_spaces = {
-            seat: observation_space(self.experiment.observation) for seat in seats}
+            seat: observation_space(
+            self.experiment.observation, self.experiment.action) for seat in seats}
         self.action_spaces = {seat: action_space(self.experiment.action) for seat in seats}
         self._random = np.random.Generator(np.random.PCG64())
         self._painter: tuple[AgentGame, ScenePainter] | None = None
@@ -65,7 +66,7 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
         """Return the space of an agent's observations."""
         return self.observation_spaces[agent]
 
-    def action_space(self, agent: str) -> spaces.Box:
+    def action_space(self, agent: str) -> spaces.Box | spaces.Discrete:
         """Return the space of an agent's actions."""
         return self.action_spaces[agent]
 
@@ -86,7 +87,8 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
             self._random = np.random.Generator(np.random.PCG64(seed))
         self._episodes.begin(int(self._random.integers(SEEDS)), wanted)
         self.agents = list(self.possible_agents)
-        return self._seen(), {agent: self._together.info() for agent in self.agents}
+        return self._seen(), {agent: self._together.info(number)
+                              for number, agent in enumerate(self.agents)}
 
     def step(self, actions: dict[str, NDArray[np.float32]]) -> tuple[
             dict[str, Seen], dict[str, float], dict[str, bool], dict[str, bool],

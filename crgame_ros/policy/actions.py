@@ -4,7 +4,7 @@
 
 from collections.abc import Sequence
 import math
-from typing import Literal, NamedTuple
+from typing import get_args, Literal, NamedTuple
 
 from crgame_ros.errors import PlanningError
 from crgame_ros.geometry.angles import wrap_pi_array
@@ -20,8 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-ActionKind = Literal['acceleration', 'pedals', 'plan']
-ACTION_KINDS: tuple[ActionKind, ...] = ('acceleration', 'pedals', 'plan')
+ActionKind = Literal['acceleration', 'pedals', 'plan', 'manoeuvre']
+ACTION_KINDS: tuple[ActionKind, ...] = get_args(ActionKind)
+# Those that only an AV can do, since they become plans.
+PLANNED_KINDS: tuple[ActionKind, ...] = ('plan', 'manoeuvre')
+MANOEUVRES = ('keep', 'left', 'right', 'faster', 'slower')
 # Acceleration for 1 and deceleration for -1 [m/s^2].
 DRIVING, BRAKING = 4.0, 8.0
 # The greatest curvature is the lower of those of full lock and of this lateral acceleration
@@ -54,8 +57,11 @@ def action_bounds(kind: ActionKind) -> tuple[NDArray[np.float32], NDArray[np.flo
     Return the least and greatest values of an action.
 
     :return: (2) for `acceleration` and `pedals`; (10, 4) for `plan`: x and y [m] of the rear axle
-        as seen from its present pose, yaw from the present one [rad] and speed [m/s]
+        as seen from its present pose, yaw from the present one [rad] and speed [m/s]; () for
+        `manoeuvre`: a number of `MANOEUVRES`
     """
+    if kind == 'manoeuvre':
+        return np.array(0.0, np.float32), np.array(len(MANOEUVRES) - 1.0, np.float32)
     if kind == 'plan':
         row = np.array((100.0, 100.0, math.pi, 100.0), np.float32)
         high = np.tile(row, (PLAN_POINTS, 1))
@@ -67,7 +73,8 @@ def checked_action(kind: ActionKind, action: object) -> Array:
     """
     Return an action clipped to its bounds.
 
-    :raises PlanningError: if it has another shape, or a number that is not finite.
+    :raises PlanningError: if it has another shape, or a number that is not finite; or if it is not
+        the number of a manoeuvre.
     """
     low, high = action_bounds(kind)
     values = np.asarray(action, dtype=np.float64)
@@ -75,6 +82,9 @@ def checked_action(kind: ActionKind, action: object) -> Array:
         raise PlanningError(f'an action "{kind}" needs {low.shape} finite numbers, this is '
                             f'{np.array2string(values.ravel()[:6], precision=3)}'
                             f' of shape {values.shape}')
+    if kind == 'manoeuvre' and not (low <= values <= high and float(values).is_integer()):
+        raise PlanningError(f'an action "{kind}" is a number from 0 to {high:g}, this is '
+                            f'{values:g}')
     return np.minimum(np.maximum(values, low), high)
 
 
@@ -105,7 +115,7 @@ def pedals(action: Array) -> DriverCommand:
 def planned_states(kind: ActionKind, action: Array, ego: VehicleState,
                    vehicle: VehicleParameters, dt_s: float, substeps: int) -> Array:
     """
-    Return the planned states of an action.
+    Return the planned states of an action; for manoeuvres see `policy.manoeuvres`.
 
     :param action: from `checked_action`.
     :param ego: present state, rear axle.

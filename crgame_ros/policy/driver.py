@@ -10,7 +10,7 @@ from crgame_ros.driver.source import DriverSource
 from crgame_ros.game.objects import ObjectDescription, ObjectStates
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.policy.actions import checked_action, PedalInverse, pedals, wanted_motion
-from crgame_ros.policy.observation import Observation
+from crgame_ros.policy.observation import Observation, ObservationHistory
 from crgame_ros.policy.policy_file import Policy
 from crgame_ros.policy.route_guide import RouteGuide
 from crgame_ros.policy.seat_view import SeatView
@@ -57,14 +57,16 @@ class PolicyDriver(DriverSource):
 
     :param policy: its action is `acceleration` or `pedals`.
     :param seat: the seat that the policy takes.
-    :raises InputError: if its action is a plan, which pedals cannot drive.
+    :raises InputError: if its actions become plans, which pedals cannot drive.
     """
 
     def __init__(self, policy: Policy, seat: DrivenSeat) -> None:
         policy.check_pedals(seat.id)
         self._policy, self._seat = policy, seat
         self._view = SeatView(seat.row, seat.driven, seat.others, seat.transform)
-        self._observation = Observation(policy.spec, seat.vehicle, self._view.things)
+        self._observation = Observation(policy.spec, seat.vehicle, self._view.things,
+                                        seat.scenario)
+        self._history = ObservationHistory(policy.spec)
         self._inverse = PedalInverse(seat.vehicle)
         self._start = self._view.own(np.tile(np.array(seat.start), (len(seat.driven), 1)))
         self._guide = RouteGuide(seat.scenario, None, self._start, seat.vehicle)
@@ -73,6 +75,7 @@ class PolicyDriver(DriverSource):
     def reset(self) -> None:
         """Begin a new run."""
         self._guide.restart(self._start)
+        self._history.begin()
         self._policy.begin()
         self._action: NDArray[np.float64] | None = None
         self._speed = self._decided_speed = self._seat.start.speed
@@ -90,8 +93,8 @@ class PolicyDriver(DriverSource):
         around = self._view.observe(vehicle_states, objects)
         seen = self._observation.observe([state], [place], [self._guide], around.poses[None],
                                          around.velocities[None])
-        self._action = checked_action(self._policy.action, self._policy.act(
-            {part: values[0] for part, values in seen.items()}))
+        self._action = checked_action(self._policy.action, self._policy.act(self._history.add(
+            {part: values[0] for part, values in seen.items()})))
         self._decided_speed = state.speed
 
     def command(self, n: int, dt_s: float) -> DriverCommand:

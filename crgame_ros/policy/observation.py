@@ -7,18 +7,23 @@ Coordinates are those of the vehicle's rear axle: x ahead, y to the left. Many v
 observed at once; the observation of one does not depend on the others.
 """
 
+from collections import deque
 from collections.abc import Sequence
 
+from commonroad.scenario.scenario import Scenario
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import SensorSpec
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.reference_point import ahead, seen_from
 from crgame_ros.perception.bodies import SensedBodies
 from crgame_ros.perception.sensors import create_sensor
+from crgame_ros.policy.bird_view import BirdView
 from crgame_ros.policy.observation_spec import (
+    Numbers,
     OBJECT_COLUMNS,
     ObservationSpec,
     ROUTE_COLUMNS,
+    stacked,
     STATE_COLUMNS,
 )
 from crgame_ros.policy.route_guide import RouteGuide, RoutePlace
@@ -28,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Observed = dict[str, NDArray[np.float32]]
+Observed = dict[str, Numbers]
 
 
 class Observation:
@@ -38,12 +43,14 @@ class Observation:
     :param spec: parts of the observation.
     :param vehicle: parameters of the vehicle.
     :param things: (N) all other objects that can appear; each call gives those that are present.
+    :param scenario: with the roads, for the image.
     """
 
     def __init__(self, spec: ObservationSpec, vehicle: VehicleParameters,
-                 things: Sequence[ObjectDescription]) -> None:
+                 things: Sequence[ObjectDescription], scenario: Scenario) -> None:
         self.spec = spec
-        self._bounds = spec.bounds()
+        self._bounds = {part: spec.bounds_now(part) for part in spec.parts}
+        self._ones = {part: spec.ones(part) for part in spec.parts if part != 'image'}
         self._sizes = np.array([(item.shape.length, item.shape.width) for item in things]
                                ).reshape(-1, 2)
         self._ahead: Array = spec.route_spacing * np.arange(
@@ -53,6 +60,8 @@ class Observation:
             self._lidar = create_sensor(SensorSpec(
                 'lidar', field_of_view=2.0 * np.pi, horizon=spec.horizon, rays=spec.rays))
             self._bodies = SensedBodies(things)
+        if 'image' in spec.parts:
+            self._bird = BirdView(spec.image_size, spec.pixel, scenario.lanelet_network, things)
 
     def observe(self, states: Sequence[VehicleState], places: Sequence[RoutePlace],
                 guides: Sequence[RouteGuide], poses: Array, velocities: Array) -> Observed:
@@ -64,11 +73,17 @@ class Observation:
         :param guides: (B) of their routes.
         :param poses: (B, N, 3) centres of the things, in the same coordinates; NaN where absent
         :param velocities: (B, N, 3)
-        :return: by part, (B, …) as in `ObservationSpec.bounds`, within them.
+        :return: by part, (B, …) as in `ObservationSpec.bounds_now`, within them.
         """
         own = np.array(states, dtype=np.float64)[:, :3]
         made: Observed = {}
         for part in self.spec.parts:
+            if part == 'image':
+                made[part] = np.stack([
+                    self._bird.paint(state, guide.driving.path, place.s, around)
+                    for state, place, guide, around in zip(states, places, guides, poses,
+                                                           strict=True)])
+                continue
             if part == 'state':
                 values = _state(states, places)
             elif part == 'route':
@@ -78,6 +93,8 @@ class Observation:
             else:
                 values = self._ranges(states, poses)
             low, high = self._bounds[part]
+            if self.spec.scaled:
+                values = values / self._ones[part]
             # Rounded before clipping: a clipped value must equal the bound to the last bit.
             made[part] = np.minimum(np.maximum(values.astype(np.float32), low), high)
         return made
@@ -123,6 +140,39 @@ class Observation:
             scan = self._lidar.scan((x, y, state.yaw), self._bodies)
             row[:] = np.minimum(scan.ranges, self.spec.horizon)
         return result
+
+
+class ObservationHistory:
+    """
+    The observations of the last decisions of one vehicle.
+
+    :param spec: which parts contain how many decisions.
+    """
+
+    def __init__(self, spec: ObservationSpec) -> None:
+        self._depths = {part: spec.history.of(part) for part in spec.parts
+                        if spec.history.of(part) > 1}
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin an episode or a run."""
+        self._kept: dict[str, deque[Numbers]] = {}
+
+    def add(self, seen: Observed) -> Observed:
+        """
+        Return an observation with those before it, the oldest first.
+
+        The first one of an episode stands in for those that are missing.
+
+        :param seen: parts at this decision.
+        """
+        whole = dict(seen)
+        for part, depth in self._depths.items():
+            kept = self._kept.setdefault(part, deque([seen[part]] * depth, depth))
+            if kept[-1] is not seen[part]:
+                kept.append(seen[part])
+            whole[part] = stacked(part, list(kept))
+        return whole
 
 
 def _state(states: Sequence[VehicleState], places: Sequence[RoutePlace]) -> Array:

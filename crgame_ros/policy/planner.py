@@ -8,10 +8,13 @@ from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.interface import Planner, PlannerContext
 from crgame_ros.planner.path_planner import initial_state
 from crgame_ros.policy.actions import checked_action, planned_states
-from crgame_ros.policy.observation import Observation
+from crgame_ros.policy.manoeuvres import Manoeuvres
+from crgame_ros.policy.observation import Observation, ObservationHistory, Observed
 from crgame_ros.policy.policy_file import load_policy
 from crgame_ros.policy.route_guide import RouteGuide
 from crgame_ros.policy.seat_view import RequestView
+from crgame_ros.vehicle.state import VehicleState
+import numpy as np
 
 # Simulation step of a vehicle driven by pedals, as in live games [s].
 DRIVEN_STEP_S = 0.01
@@ -33,14 +36,21 @@ class PolicyPlanner(Planner):
         """Plan the route, and run the policy once, because its first call may take long."""
         self._context = context
         self._view = RequestView(context.vehicle_id, context.objects)
-        self._observation = Observation(self._policy.spec, context.vehicle, self._view.things)
+        self._observation = Observation(self._policy.spec, context.vehicle, self._view.things,
+                                        context.scenario)
+        self._history = ObservationHistory(self._policy.spec)
         start = initial_state(context)
         self._guide = RouteGuide(context.scenario, context.planning_problem, start,
                                  context.vehicle)
+        self._manoeuvres = None if self._policy.action != 'manoeuvre' else Manoeuvres(
+            context.scenario, context.planning_problem, start, context.vehicle)
         self._decided_k: int | None = None
         self._policy.begin()
         self.plan(PlanRequest(0, context.k0, context.time_step_s, start))
         self._guide.restart(start)
+        if self._manoeuvres is not None:
+            self._manoeuvres.restart(start)
+        self._history.begin()
         self._policy.begin()
         self._decided_k = None
 
@@ -52,9 +62,18 @@ class PolicyPlanner(Planner):
             around = self._view.observe(request)
             seen = self._observation.observe([request.ego], [place], [self._guide],
                                              around.poses[None], around.velocities[None])
-            self._action = checked_action(self._policy.action, self._policy.act(
+            self._decide(request.ego, self._history.add(
                 {part: values[0] for part, values in seen.items()}))
+        if self._manoeuvres is not None:
+            return Plan(request.stamp_ns, self._manoeuvres.plan(request.ego, request.time_step_s))
         states = planned_states(
             self._policy.action, self._action, request.ego, self._context.vehicle,
             request.time_step_s, max(1, round(request.time_step_s / DRIVEN_STEP_S)))
         return Plan(request.stamp_ns, states)
+
+    def _decide(self, ego: VehicleState, seen: Observed) -> None:
+        if self._manoeuvres is not None:
+            seen['mask'] = self._manoeuvres.mask(ego).astype(np.float32)
+        self._action = checked_action(self._policy.action, self._policy.act(seen))
+        if self._manoeuvres is not None:
+            self._manoeuvres.decide(int(self._action), ego)

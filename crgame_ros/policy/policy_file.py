@@ -7,12 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.policy.actions import ACTION_KINDS, ActionKind
+from crgame_ros.policy.actions import ACTION_KINDS, ActionKind, PLANNED_KINDS
+from crgame_ros.policy.observation import Observed
 from crgame_ros.policy.observation_spec import ObservationSpec
 from crgame_ros.registry import module_of_file, POLICY
 from crgame_ros.schema.reading import read
-import numpy as np
-from numpy.typing import NDArray
 
 _SEE = 'see docs/gym.md'
 
@@ -23,14 +22,15 @@ class Policy:
     A policy, as `load` in its file returns it.
 
     :param act: returns the action for an observation: arrays by part, as from the environment.
-        The action must depend only on the observations since `begin`.
+        The action must depend only on the observations since `begin`. With manoeuvres, the part
+        `mask` tells which there are.
     :param action: kind of its actions, as in the environment it was trained in.
     :param observation: parts of its observation, as there: keys of `ObservationSpec`.
     :param ticks: scenario steps for which an action holds, as there.
     :param begin: is called before each run, for policies with internal state.
     """
 
-    act: Callable[[Mapping[str, NDArray[np.float32]]], object]
+    act: Callable[[Observed], object]
     action: ActionKind = 'acceleration'
     observation: Mapping[str, object] = field(default_factory=dict)
     ticks: int = 1
@@ -38,12 +38,12 @@ class Policy:
 
     def check_pedals(self, seat: str) -> None:
         """
-        Check that the policy can drive a human's seat: plans cannot.
+        Check that the policy can drive a human's seat: plans and manoeuvres cannot.
 
-        :raises InputError: naming the seat, if its actions are plans.
+        :raises InputError: naming the seat, if its actions become plans.
         """
-        if self.action == 'plan':
-            raise InputError("its actions are plans, but a human's seat needs pedals",
+        if self.action in PLANNED_KINDS:
+            raise InputError("its actions become plans, but a human's seat needs pedals",
                              f'{seat}: driver {POLICY}…',
                              "name it as an AV's planner, or train it with other actions")
 

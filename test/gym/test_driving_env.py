@@ -16,7 +16,7 @@ from crgame_ros.simulation.observer import drivability_monitor
 from crgame_ros.simulation.offline import observed_run, OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np
-from policies import follow_lane, HERE
+from policies import change_lanes, follow_lane, HERE, LANES
 import pytest
 
 SCENARIOS = Path(__file__).resolve().parents[2] / 'scenarios'
@@ -76,6 +76,22 @@ def test_a_policy_drives_in_a_run_as_it_did_in_the_environment(seat: str) -> Non
     run = _run(seat).vehicle_states[10::10]
     # A request carries velocities as vectors: the two differ only by rounding.
     assert np.abs(np.array(states) - run)[:, :, :4].max() < 1e-6
+
+
+def test_manoeuvres_of_a_policy_are_the_same_in_a_run_as_in_the_environment() -> None:
+    env = DrivingEnv(game='cut_in', action='manoeuvre', observation=LANES, ticks=5)
+    seen, _ = env.reset(seed=0)
+    states = []
+    for _ in range(14):
+        seen = env.step(change_lanes(seen))[0]
+        states.append(env.agent.game.simulation.states)
+    game = load_game(SCENARIOS / 'cut_in.yaml')
+    assert game.avs is not None
+    game = replace(game, avs=(replace(game.avs[0], planner=f'policy:{HERE}:manoeuvres'),))
+    run = run_offline(build_setup(game), duration_s=7.0)
+    assert np.abs(np.array(states) - run.vehicle_states[50::50])[:, :, :4].max() < 1e-6
+    # It has changed lanes.
+    assert abs(states[-1][1].y - states[0][1].y) > 3.0
 
 
 @pytest.mark.matrix('parked_cars-av0', 'dense_merge-av0')

@@ -53,6 +53,9 @@ def test_pettingzoo_accepts_every_game_with_all_its_seats(game: str) -> None:
 @pytest.mark.parametrize('keywords', [
     {'seat': 'hv0'}, {'seat': 'hv0', 'action': 'pedals'}, {'action': 'pedals'},
     {'observation': {'parts': ['lidar', 'state'], 'rays': 8}}, {'ticks': 5},
+    {'observation': {'scaled': True, 'history': {'state': 3, 'objects': 2}}},
+    {'observation': {'parts': ['image', 'state'], 'history': {'image': 2}}, 'seat': 'hv0'},
+    {'action': 'manoeuvre', 'ticks': 5},
     {'vary': {'speed': 3.0, 'along': 10.0}}, {'reward': {'ttc': -1.0, 'a_req': -0.1}}])
 def test_gymnasium_accepts_every_choice(keywords: dict[str, object]) -> None:
     check_env(gymnasium.make('crgame/Merge-v0', **keywords).unwrapped, skip_render_check=True)
@@ -71,7 +74,8 @@ def test_gymnasium_accepts_plans_and_perception() -> None:
     ({'game': 'cut_in', 'scenario': 'x.xml'}, 'one of them'),
     ({'game': 'cut_in', 'seat': 'av7'}, 'take one of hv0, av0'),
     ({'game': 'cut_in', 'seat': 'hv0', 'action': 'plan'}, 'by pedals, not by plans'),
-    ({'game': 'cut_in', 'action': 'fly'}, 'acceleration, pedals, plan'),
+    ({'game': 'cut_in', 'seat': 'hv0', 'action': 'manoeuvre'}, 'by pedals, not by plans'),
+    ({'game': 'cut_in', 'action': 'fly'}, 'acceleration, pedals, plan, manoeuvre'),
     ({'game': 'cut_in', 'reward': {'joy': 1.0}}, 'there is no term "joy"'),
     ({'game': 'cut_in', 'reward': {'goal': float('nan')}}, 'finite'),
     ({'game': 'cut_in', 'ends': ['boredom']}, 'collision, off_road, goal'),
@@ -103,6 +107,24 @@ def test_games_together_are_the_same_as_one_after_the_other() -> None:
         if given is not None:
             first, second = together.step(given), apart.step(given)
     assert first[-1]['time_s'].max() < 2.1
+
+
+def test_manoeuvres_and_histories_together_are_those_of_single_games() -> None:
+    keywords = {'game': 'merge', 'action': 'manoeuvre', 'ticks': 5, 'duration': 3.0,
+                'observation': {'history': {'state': 2}}, 'vary': {'speed': 4.0}}
+    together = GamesTogether(2, **keywords)
+    apart = gymnasium.make_vec(ANY_GAME, 2, vectorization_mode='sync', **keywords)
+    first, second = together.reset(seed=5), apart.reset(seed=5)
+    for actions in ((0, 3), (4, 3), (1, 0), (0, 0), (2, 1), (0, 0), (0, 0), (3, 0)):
+        for part, values in first[0].items():
+            assert (values == second[0][part]).all()
+        assert (first[-1]['action_mask'] == second[-1]['action_mask']).all()
+        first, second = together.step(np.array(actions)), apart.step(np.array(actions))
+
+
+def test_pettingzoo_accepts_manoeuvres() -> None:
+    parallel_api_test(WithoutOptions(game='two_avs', seats=('av0', 'av1'), action='manoeuvre',
+                                     duration=1.0), num_cycles=12)
 
 
 def test_processes_give_the_same_episodes_as_one() -> None:

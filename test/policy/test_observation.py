@@ -9,7 +9,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.file import load_game
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.policy.observation import Observation
+from crgame_ros.policy.observation import Observation, ObservationHistory
 from crgame_ros.policy.observation_spec import ObservationSpec
 from crgame_ros.policy.route_guide import RouteGuide
 from crgame_ros.schema.reading import read
@@ -41,7 +41,8 @@ def observed(setup: Setup, guide: RouteGuide, state: VehicleState, spec: Observa
              poses: np.ndarray, velocities: np.ndarray) -> dict[str, np.ndarray]:
     """Observe one vehicle."""
     guide.restart(state)
-    made = Observation(spec, setup.avs[0].vehicle, THINGS).observe(
+    made = Observation(
+        spec, setup.avs[0].vehicle, THINGS, setup.loaded.scenario).observe(
         [state], [guide.follow(state)], [guide], poses[None], velocities[None])
     return {part: values[0] for part, values in made.items()}
 
@@ -119,3 +120,77 @@ def test_the_lidar_measures_as_shapely_does(setup: Setup, guide: RouteGuide) -> 
 def test_a_wrong_specification_is_refused(given: dict[str, object]) -> None:
     with pytest.raises(InputError):
         read(ObservationSpec, given, 'observation')
+
+
+def test_scaled_numbers_are_shares_of_the_stated_ones(setup: Setup, guide: RouteGuide) -> None:
+    state = setup.avs[0].state._replace(yaw=1.1, speed=20.0)
+    poses, velocities = np.full((2, 4, 3), np.nan)
+    poses[:2] = [(state.x + 30.0, state.y, 0.0), (state.x, state.y - 5.0, 3.0)]
+    velocities[:2] = [(60.0, 0.0, 0.0), (0.0, -4.0, 0.1)]
+    parts = ('state', 'route', 'objects', 'lidar')
+    plain, scaled = (observed(setup, guide, state, ObservationSpec(
+        parts=parts, scaled=given), poses, velocities) for given in (False, True))
+    # 20 of 50 m/s; 1000 m is no goal; 50 m of route; 100 m of reach; 60 m of lidar.
+    assert scaled['state'][0] == pytest.approx(0.4)
+    assert scaled['route'][:, :2] == pytest.approx(plain['route'][:, :2] / 50.0)
+    assert scaled['objects'][0, 1:3] == pytest.approx(plain['objects'][0, 1:3] / 100.0)
+    assert scaled['objects'][:2, 6:] == pytest.approx(plain['objects'][:2, 6:] / (20.0, 5.0))
+    # 60 m/s is beyond the 50 m/s that are 1; turned by 1.1 rad it is 27 m/s ahead.
+    assert scaled['objects'][1, 4:6] == pytest.approx((60.0 * math.cos(1.1) / 50.0, -1.0))
+    assert scaled['lidar'] == pytest.approx(plain['lidar'] / 60.0)
+
+
+def test_a_history_is_the_observations_before_the_oldest_first() -> None:
+    spec = read(ObservationSpec, {'parts': ['state', 'lidar', 'image'], 'rays': 2,
+                                  'image_size': 8, 'history': {'state': 3, 'image': 2}}, 'spec')
+    history = ObservationHistory(spec)
+    for _ in range(2):
+        history.begin()
+        for step, wanted in enumerate(([0, 0, 0], [0, 0, 1], [0, 1, 2], [1, 2, 3])):
+            seen = history.add({'state': np.full(9, step, np.float32),
+                                'lidar': np.full(2, step, np.float32),
+                                'image': np.full((3, 8, 8), step, np.uint8)})
+            assert {part: values.shape for part, values in seen.items()} == {
+                part: low.shape for part, (low, _) in spec.bounds().items()}
+            assert seen['state'][:, 0].tolist() == wanted
+            assert seen['image'][[0, 3], 0, 0].tolist() == wanted[1:]
+            assert seen['lidar'].tolist() == [step, step]
+
+
+def test_the_image_shows_road_route_and_objects_where_geometry_says(
+        setup: Setup, guide: RouteGuide) -> None:
+    path, spec = guide.driving.path, ObservationSpec(parts=('image',), image_size=96, pixel=0.5)
+    x, y, yaw, _ = path.pose_at(np.array(guide.driving.start_s + 40.0)).tolist()
+    state = VehicleState(x, y, yaw, 12.0)
+    poses = np.full((4, 3), np.nan)
+    poses[0] = x + 20.0 * math.cos(yaw + 0.3), y + 20.0 * math.sin(yaw + 0.3), yaw + 0.8
+    picture = observed(setup, guide, state, spec, poses, np.zeros((4, 3)))['image']
+    assert (picture.shape, picture.dtype) == ((3, 96, 96), np.uint8)
+    # The middles of the pixels in the map: the axle is in the middle, three quarters down.
+    ahead, left = 0.5 * (71.5 - np.arange(96.0)), 0.5 * (47.5 - np.arange(96.0))
+    ahead, left = np.meshgrid(ahead, left, indexing='ij')
+    spots = shapely.points(x + math.cos(yaw) * ahead - math.sin(yaw) * left,
+                           y + math.sin(yaw) * ahead + math.cos(yaw) * left)
+    road = shapely.union_all([item.polygon.shapely_object for item in
+                              setup.loaded.scenario.lanelet_network.lanelets])
+    body = shapely.affinity.translate(shapely.affinity.rotate(
+        shapely.box(-2.0, -1.0, 2.0, 1.0), yaw + 0.8, (0, 0), use_radians=True), *poses[0, :2])
+    line = shapely.LineString(path.pose_at(guide.driving.start_s + 40.0
+                                           + np.arange(0.0, 36.0, 0.5))[:, :2])
+    for channel, shape in zip(picture, (road, line, body), strict=True):
+        # All that is shown is nearer than a pixel's diagonal, all farther inside is shown.
+        away = shapely.distance(spots, shape)
+        assert away[channel > 0].max() < 0.71
+        inside = shapely.distance(spots, shape.boundary) * shapely.contains(shape, spots)
+        assert (channel[inside > 0.71] > 0).all()
+    assert (picture[2] > 0).sum() * 0.25 == pytest.approx(8.0, rel=0.35)
+    assert (picture[1] > 0).sum() > 60
+
+
+@pytest.mark.parametrize(('values', 'said'), [
+    ({'history': {'state': 0}}, 'from 1 to 100'), ({'history': {'image': 2}}, 'has not'),
+    ({'history': {'sound': 2}}, 'unknown'), ({'image_size': 4}, 'image_size'),
+    ({'scaled': 'much'}, 'scaled')])
+def test_wrong_observations_are_refused_in_a_line(values: dict[str, object], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read(ObservationSpec, values, 'spec')

@@ -33,7 +33,7 @@ def driven(name: str, function: str, *, av: bool, seconds: float = 3.0) -> Offli
 
 
 @pytest.mark.parametrize('function', ['acceleration', 'every_third', 'by_pedals', 'by_plans',
-                                      'with_lidar'])
+                                      'with_lidar', 'manoeuvres'])
 def test_a_policy_plans_for_an_av_without_a_fallback(function: str) -> None:
     record = driven('cut_in', function, av=True).planners['av0']
     assert record.statistics.fallbacks == 0
@@ -79,8 +79,9 @@ def test_what_is_no_policy_is_refused_in_a_line(name: str, said: str) -> None:
 
 
 def test_a_plan_is_nothing_to_press_pedals_by() -> None:
-    with pytest.raises(InputError, match='plans'):
-        driven('cut_in', 'by_plans', av=False)
+    for function in ('by_plans', 'manoeuvres'):
+        with pytest.raises(InputError, match='plans'):
+            driven('cut_in', function, av=False)
 
 
 def test_a_game_finds_its_policies_beside_it_and_from_anywhere(tmp_path: Path) -> None:
