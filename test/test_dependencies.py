@@ -50,6 +50,9 @@ EXTRAS = {'evaluate': {'cryptography', 'dask', 'distributed'}, 'gym': {'gymnasiu
           'instruments': {'pylsl', 'serial'},
           'openscenario': {'scenariogeneration'}, 'search': {'cmaes', 'optuna', 'sklearn'}}
 PIP_NAMES = {'serial': 'pyserial', 'sklearn': 'scikit-learn'}
+          'minari': {'minari'}, 'openscenario': {'scenariogeneration'},
+          'search': {'cmaes', 'optuna', 'sklearn'}}
+PIP_NAMES = {'sklearn': 'scikit-learn'}
 # Of requirements-planners.txt, by imported name.
 OF_PLANNERS = {'commonroad_idm_planner': 'commonroad-idm-planner',
                'commonroad_rp': 'commonroad-reactive-planner'}

@@ -139,12 +139,14 @@ class AgentGame:
     :param experiment: settings that its episodes share.
     :param setups: setups of its episodes.
     :param scene: name of its scene.
-    :ivar game: the game, which moves all vehicles and objects.
+    :param driving: makes the game, which moves all vehicles and objects.
+    :ivar game: this game.
     """
 
-    def __init__(self, experiment: Experiment, setups: EpisodeSetups, scene: str) -> None:
+    def __init__(self, experiment: Experiment, setups: EpisodeSetups, scene: str,
+                 driving: type[DrivingGame] = DrivingGame) -> None:
         self.experiment, self.setups, self.scene = experiment, setups, scene
-        self.game = DrivingGame(setups, experiment.seats, experiment.action, experiment.ticks)
+        self.game = driving(setups, experiment.seats, experiment.action, experiment.ticks)
         self._observations = [
             Observation(experiment.observation, seat.vehicle.vehicle, seat.view.things,
                         setups.base.loaded.scenario)

@@ -330,11 +330,11 @@ class DrivingGame:
         """Drive one scenario step; return the vehicles' centres (T, V, 3) at its steps."""
         simulation, scheduler = self.simulation, self.simulation.scheduler
         self._plan()
-        before, dt_s = simulation.objects, scheduler.dt_s
+        before = self.objects
         trace, since_s = [], []
         for _ in range(scheduler.steps_per_tick):
-            result = simulation.step(dt_s, self._commands(dt_s))
-            trace.append(simulation.states)
+            result, vehicles = self._step()
+            trace.append(vehicles)
             since_s.append(scheduler.since_tick_s(simulation.n))
             if self._perceiving and simulation.n % self._perceive_every == 0:
                 perceive(simulation, self._perceiving)
@@ -345,9 +345,15 @@ class DrivingGame:
         centers = shifted(states[..., :3], self._to_center)
         if self._search is not None:
             for seat in self.seats:
-                found = self._search.hits(seat.row, centers, since_s, before, simulation.objects)
+                found = self._search.hits(seat.row, centers, since_s, before, self.objects)
                 seat.hit = tuple(sorted({*seat.hit, *found})) if found else seat.hit
         return centers
+
+    def _step(self) -> tuple[StepResult, Sequence[VehicleState]]:
+        """Drive one simulation step; return its result and the states of the vehicles."""
+        dt_s = self.simulation.scheduler.dt_s
+        result = self.simulation.step(dt_s, self._commands(dt_s))
+        return result, self.simulation.states
 
     def _proceed(self, result: StepResult, states: Array) -> None:
         """Pass a tick to planners and drivers, update agents' surroundings, notify observers."""
@@ -356,7 +362,7 @@ class DrivingGame:
         show(self.simulation, result, list(self._hands.values()))
         for seat in self.seats:
             seat.around = seat.pilot.observe(result, states) if seat.pilot else seat.view.observe(
-                states, self.simulation.objects)
+                states, self.objects)
         for observer in self._observers:
             observer.observe(result.n, 0.0, states, result.objects)
 

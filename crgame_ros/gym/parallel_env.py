@@ -56,8 +56,8 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
         self.agents: list[str] = []
         self._episodes = Episodes(self.experiment)
         self.observation_spaces = {
-            seat: observation_space(
-            self.experiment.observation, self.experiment.action) for seat in seats}
+            seat: observation_space(self.experiment.observation, self.experiment.action)
+            for seat in seats}
         self.action_spaces = {seat: action_space(self.experiment.action) for seat in seats}
         self._random = np.random.Generator(np.random.PCG64())
         self._painter: tuple[AgentGame, ScenePainter] | None = None
