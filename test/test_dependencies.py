@@ -47,12 +47,9 @@ THIRD_PARTY = {
 }
 # Packages of extras, chosen by the user; no other part of the package imports them.
 EXTRAS = {'evaluate': {'cryptography', 'dask', 'distributed'}, 'gym': {'gymnasium', 'pettingzoo'},
-          'instruments': {'pylsl', 'serial'},
+          'instruments': {'pylsl', 'serial'}, 'minari': {'minari'},
           'openscenario': {'scenariogeneration'}, 'search': {'cmaes', 'optuna', 'sklearn'}}
 PIP_NAMES = {'serial': 'pyserial', 'sklearn': 'scikit-learn'}
-          'minari': {'minari'}, 'openscenario': {'scenariogeneration'},
-          'search': {'cmaes', 'optuna', 'sklearn'}}
-PIP_NAMES = {'sklearn': 'scikit-learn'}
 # Of requirements-planners.txt, by imported name.
 OF_PLANNERS = {'commonroad_idm_planner': 'commonroad-idm-planner',
                'commonroad_rp': 'commonroad-reactive-planner'}
