@@ -8,7 +8,12 @@ import unicodedata
 
 from crgame_ros.cockpit.rights import ROLES
 from crgame_ros.game.driven_vehicle import VehicleId
-from crgame_ros.game.task_documents import Milliseconds, PageTimes, PromptNumber
+from crgame_ros.game.task_documents import (
+    Milliseconds,
+    PageTimes,
+    PromptNumber,
+    SteadySeconds,
+)
 from crgame_ros.schema.messages import Flag, HexKey, Message, MessageId, MessageReader
 from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator, StringConstraints
@@ -306,11 +311,14 @@ class TaskDone(Message):
     delay_ms: Milliseconds | None = None
     picture_ms: Milliseconds | None = None
     paused_ms: Milliseconds | None = None
+    steady_s: SteadySeconds | None = None
+    clock_error_ms: Milliseconds | None = None
 
     @property
     def times(self) -> PageTimes:
         """Return what the page has measured."""
-        return PageTimes(self.response_ms, self.delay_ms, self.picture_ms, self.paused_ms)
+        return PageTimes(self.response_ms, self.delay_ms, self.picture_ms, self.paused_ms,
+                         self.steady_s, self.clock_error_ms)
 
 
 SeatOrder = Claim | Release | Ask | HandOver | Answer | Ready

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import logging
 import socket
+import time
 
 from aiohttp import web, WSCloseCode, WSMsgType
 from crgame_ros.cockpit.backend import Backend
@@ -195,7 +196,8 @@ class Session:
             case Ping():
                 if message.round_trip_ms is not None:
                     client.round_trip_ms = message.round_trip_ms
-                self._hub.send_event('pong', {'t': message.t}, only=client)
+                self._hub.send_event('pong', {'t': message.t, 'steady_s': time.monotonic()},
+                                     only=client)
             case _:
                 await self._ask(client, message)
 

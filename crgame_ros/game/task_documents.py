@@ -16,6 +16,7 @@ MAX_NUMBER = 1_000_000
 LONGEST_MS = 600_000.0
 PromptNumber = Annotated[int, Exact(), Interval(ge=0, le=MAX_NUMBER)]
 Milliseconds = Annotated[float, Exact(), Interval(ge=-LONGEST_MS, le=LONGEST_MS)]
+SteadySeconds = Annotated[float, Exact(), Interval(ge=0.0, le=1e10)]
 
 # Kinds of task entries: the task begins or ends; a stimulus or request comes, is shown, or is
 # over; the driver answers (`unrequested` answers had no stimulus).
@@ -33,12 +34,18 @@ class PageTimes:
     :param delay_ms: from the stimulus's onset to that frame, by the page's estimate.
     :param picture_ms: from that frame to the next: the uncertainty of the first.
     :param paused_ms: pauses between frame and answer, which the response time leaves out.
+    :param steady_s: when that frame was drawn, on the steady clock of the server's machine, which
+        is that of the run's cycles [s]; None if no ping has related the clocks.
+    :param clock_error_ms: half of the round trip that related both clocks: the error of `steady_s`
+        is no larger.
     """
 
     response_ms: Milliseconds | None = None
     delay_ms: Milliseconds | None = None
     picture_ms: Milliseconds | None = None
     paused_ms: Milliseconds | None = None
+    steady_s: SteadySeconds | None = None
+    clock_error_ms: Milliseconds | None = None
 
 
 NOT_MEASURED = PageTimes()

@@ -39,6 +39,7 @@ class TrialSettings:
     :param names: whether the names of planners are shown.
     :param sound: whether sound is on.
     :param instruments: streams and triggers, instead of the game's.
+    :param photodiode: corner of the view that is white while a light or a request is shown.
     :param events: added to those of the game.
     :param tasks: besides driving, added to those of the game; a task replaces an outer one of the
         same name.
@@ -60,6 +61,7 @@ class TrialSettings:
     plans: bool | None = None
     names: bool | None = None
     sound: bool | None = None
+    photodiode: Literal['top-left', 'top-right', 'bottom-left', 'bottom-right'] | None = None
     instruments: InstrumentsSpec | None = None
     events: EventList = ()
     tasks: TaskList = ()

@@ -148,6 +148,11 @@ def test_lights_requests_and_notes_are_shown_answered_and_recorded(
         assert times.response_ms <= pressed[number] - entry['changed'] + 1.0
         assert times.delay_ms is not None and 0.0 <= times.delay_ms < 2000.0
         assert times.picture_ms is not None and times.picture_ms > 0.0
+        # Both clocks are of this machine: the picture is later than the onset's cycle, and no
+        # later than the page heard of it and drew, up to the error of the relation.
+        assert times.clock_error_ms is not None and times.clock_error_ms >= 0.0
+        delay_ms = 1e3 * (lights[number].shown_s - lights[number].onset_s)
+        assert -times.clock_error_ms <= delay_ms < 2000.0
         assert lights[number].response_time_s == pytest.approx(times.response_ms / 1e3)
     assert [row.outcome for row in rows if row.what == 'unrequested'] == ['unrequested']
     assert lights[reloaded - 1].outcome == 'missed'

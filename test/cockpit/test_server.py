@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 import shutil
 import struct
+import time
 
 from aiohttp import ClientSession, web, WSMsgType, WSServerHandshakeError
 from cockpit_support import (
@@ -170,10 +171,13 @@ async def test_requests_get_the_backends_reply_and_inputs_do_not() -> None:
             assert await next_text(socket, 'reply') == {
                 'type': 'reply', 'to': 7, 'ok': ok, 'text': text}
         await socket.send_json({'type': 'input', 'seat': 'hv0', 'keys': [1, 0, 0, 0]})
+        asked_s = time.monotonic()
         await socket.send_json({'type': 'ping', 't': 5.5})
         async for message in socket:
             if message.type is WSMsgType.TEXT:
-                assert json.loads(message.data) == {'type': 'pong', 't': 5.5}
+                pong = json.loads(message.data)
+                assert (pong['type'], pong['t']) == ('pong', 5.5)
+                assert asked_s <= pong['steady_s'] <= time.monotonic()
                 break
         assert running.backend.commands[-1] == ('c1', {
             'type': 'input', 'seat': 'hv0', 'keys': [True, False, False, False]})

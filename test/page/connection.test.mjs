@@ -7,6 +7,7 @@ import { beforeEach, test } from 'node:test';
 
 import { Connection } from '../../page/cockpit/js/connection.js';
 import { InputSender } from '../../page/cockpit/js/driving/sender.js';
+import { ServerClock } from '../../page/cockpit/js/server_clock.js';
 import { frameOf } from './support.mjs';
 
 /** A server that a test controls. */
@@ -52,7 +53,8 @@ beforeEach((t) => {
 
 function connected() {
   const told = [];
-  const store = { setConnected: (on) => told.push(on), receive: (message) => told.push(message),
+  const store = { serverClock: new ServerClock(), setConnected: (on) => told.push(on),
+    receive: (message) => told.push(message),
     receiveFrame: (frame) => told.push(frame) };
   const connection = new Connection(store);
   const [socket] = FakeSocket.all;
@@ -135,8 +137,9 @@ test('the answer time is measured once a second', (t) => {
   t.mock.timers.tick(1000);
   assert.deepEqual(socket.sent, [{ type: 'ping', t: 100 }]);
   now_ms = 142;
-  socket.say({ type: 'pong', t: 100 });
+  socket.say({ type: 'pong', t: 100, steady_s: 7 });
   assert.equal(store.round_trip_ms, 42);
+  assert.deepEqual(store.serverClock.at(121), { steady_s: 7, clock_error_ms: 21 });
 });
 
 test('input is sent at each change and twenty times a second, hands off once', (t) => {

@@ -17,15 +17,16 @@ test('an address without a seat is the page with everything', () => {
 test('defaults show a participant the least', () => {
   assert.deepEqual(readStage('?stage=hv0'), { seat: 'hv0', view: 'driver', map: true,
     names: false, plans: false, sound: true, mirrors: true, change: false, fieldOfView_deg: null,
-    lang: 'en' });
+    corner: null, lang: 'en' });
 });
 
 test('the address can set everything; invalid values are ignored', () => {
   assert.deepEqual(readStage('?stage=hv1&view=map&map=0&names=1&plans=1&sound=0&mirrors=0'
-    + '&change=1&fov=60&lang=de'), { seat: 'hv1', view: 'map', map: false, names: true,
-    plans: true, sound: false, mirrors: false, change: true, fieldOfView_deg: 60, lang: 'de' });
-  assert.deepEqual(readStage('?stage=hv0&view=moon&map=no&names=yes&plans=2&fov=900&lang=xx'),
-    readStage('?stage=hv0'));
+    + '&change=1&fov=60&corner=top-left&lang=de'), { seat: 'hv1', view: 'map', map: false,
+    names: true, plans: true, sound: false, mirrors: false, change: true, fieldOfView_deg: 60,
+    corner: 'top-left', lang: 'de' });
+  assert.deepEqual(readStage('?stage=hv0&view=moon&map=no&names=yes&plans=2&fov=900&corner=no'
+    + '&lang=xx'), readStage('?stage=hv0'));
 });
 
 test('a stage is no side window', () => {

@@ -139,3 +139,22 @@ test('who rides in an AV answers its lights by one key, and takes over by anothe
   await picture();
   assert.ok(find('light').hidden);
 });
+
+test('the corner for a photodiode is white in the pictures that hold a stimulus', async () => {
+  globalThis.window.crgame.stage = { address: { seat: 'hv0', corner: 'top-right' } };
+  begin({});
+  const lit = () => find('corner').classList.contains('lit');
+  tasks(['light']);
+  await picture();
+  assert.ok(!find('corner').hidden && !lit());
+  assert.equal(find('corner').dataset.corner, 'top-right');
+  tasks(['light'], prompt(LIGHT));
+  await picture();
+  assert.deepEqual([find('light').hidden, lit()], [false, true]);
+  await picture(1100);
+  await picture();
+  assert.deepEqual([find('light').hidden, lit()], [true, false]);
+  globalThis.window.crgame.stage.address.corner = null;
+  await picture();
+  assert.ok(find('corner').hidden);
+});

@@ -12,7 +12,10 @@ from crgame_ros.analysis.behaviour.reactions import reaction_to
 from crgame_ros.analysis.behaviour.take_overs import hands_on_after
 from crgame_ros.game.task_documents import NOT_MEASURED, PageTimes, TaskEntry
 from crgame_ros.game.task_spec import DetectionResponse, TaskKind
+from crgame_ros.instruments.run_clock import run_times_s
 from crgame_ros.recording.run_record import RunRecord
+import numpy as np
+from numpy.typing import NDArray
 
 # Entries that begin a row; another entry of the same number ends it.
 _BEGINS = ('begin', 'stimulus', 'request', 'unrequested')
@@ -38,6 +41,7 @@ class TaskEvent(NamedTuple):
     :param what: stimulus, unrequested, request or span (from beginning to end of a task).
     :param times: times that the page measured.
     :param answered_s: for a request, until a person had the seat of the AV [s]
+    :param shown_s: when the first picture with it was drawn, on the run's clock [s]
     """
 
     kind: TaskKind
@@ -51,14 +55,24 @@ class TaskEvent(NamedTuple):
     what: str = ''
     times: PageTimes = NOT_MEASURED
     answered_s: float = math.nan
+    shown_s: float = math.nan
 
 
 def task_events(run: RunRecord) -> list[TaskEvent]:
     """Return the events of a run's tasks, in the order of their onsets."""
     dt_s = run.log.game.scheduler.dt_s
+    starts = np.empty((0, 2)) if run.log.cycles is None else run.log.cycles.steady_rows()
     rows = [_row(run, entry, run.tasks[number + 1:], dt_s)
             for number, entry in enumerate(run.tasks) if entry.what in _BEGINS]
-    return sorted(rows, key=lambda row: row.onset_s)
+    return sorted((_placed(row, starts, dt_s) for row in rows), key=lambda row: row.onset_s)
+
+
+def _placed(row: TaskEvent, starts: NDArray[np.float64], dt_s: float) -> TaskEvent:
+    """Return the event with the run's time of its first picture, where it is known."""
+    steady_s = row.times.steady_s
+    if steady_s is None or not len(starts):
+        return row
+    return row._replace(shown_s=float(run_times_s(np.array([steady_s]), starts, dt_s)[0]))
 
 
 def _row(run: RunRecord, entry: TaskEntry, later: Sequence[TaskEntry], dt_s: float) -> TaskEvent:

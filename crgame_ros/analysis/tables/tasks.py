@@ -60,6 +60,14 @@ _DELAY = Column(
     'shown_delay_ms', NUMBER, 'ms', 'from the onset to the first picture that showed it',
     variant='the page estimates it: since it heard of the onset, and half of the way to the '
             'server and back', empty='no page showed it')
+_SHOWN = (
+    Column('shown_time_s', NUMBER, 's', 'when the first picture that showed it was drawn, on the '
+           "run's clock", variant="by the page's clock, related to the steady clock of the cycles "
+           'by the quickest of the last 60 pings', empty='no page showed it, or its clock is not '
+           'known'),
+    Column('shown_error_ms', NUMBER, 'ms', 'bound of the error of that relation',
+           variant='half of the round trip of that ping; a screen adds its own delay',
+           empty='as the time itself'))
 _PICTURE = Column('picture_ms', NUMBER, 'ms', 'from that picture to the next', _PAGE,
                   empty='no page showed it')
 DETECTION_RESPONSES = TableDeclaration(
@@ -67,7 +75,7 @@ DETECTION_RESPONSES = TableDeclaration(
     ('run', 'task', 'time_s', 'number'),
     (RUN, _TASK, _VEHICLE,
      Column('number', INTEGER, '1', 'counts the stimuli of the task from 1; 0: an answer to none'),
-     _TIME, _DELAY, _PICTURE,
+     _TIME, _DELAY, *_SHOWN, _PICTURE,
      Column('response_time_ms', NUMBER, 'ms', 'from that picture to the answer', _PAGE,
             'pauses of the run left out', 'there was no answer in time'),
      Column('paused_ms', NUMBER, 'ms', 'pauses of the run that the response time leaves out',
@@ -95,7 +103,7 @@ TAKE_OVER_REQUESTS = TableDeclaration(
     'take_over_requests', 'a request to take over that a task made', ('run', 'task', 'number'),
     (RUN, _TASK, _VEHICLE, Column('number', INTEGER, '1', 'counts the requests from 1'), _TIME,
      Column('duration_s', NUMBER, 's', 'until the vehicle was driven or the request disappeared'),
-     _DELAY, _PICTURE,
+     _DELAY, *_SHOWN, _PICTURE,
      Column('first_input_s', NUMBER, 's', 'from the onset to the first input', 'consumed command',
             'of an AV hands on, as in take_overs; of a vehicle that is driven by hand already the '
             'first response of reactions', 'there was none'),
@@ -129,6 +137,7 @@ def write_tasks(run: Run, writers: Mapping[str, TableRows]) -> None:
 def _common(event: TaskEvent) -> dict[str, object]:
     return {'task': event.name, 'vehicle': event.seat, 'number': event.value,
             'time_s': event.onset_s, 'shown_delay_ms': event.times.delay_ms,
+            'shown_time_s': _known(event.shown_s), 'shown_error_ms': event.times.clock_error_ms,
             'picture_ms': event.times.picture_ms, 'outcome': event.outcome}
 
 

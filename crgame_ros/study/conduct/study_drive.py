@@ -142,6 +142,7 @@ class StudyDrive:
                  for name in ('map', 'names', 'plans', 'sound')}
         return f'{cockpit.rstrip("/")}/?' + urlencode(
             {'stage': self.seat, 'view': settings.view or 'driver', **shown,
+             **({} if settings.photodiode is None else {'corner': settings.photodiode}),
              'lang': language, 'key': key})
 
 

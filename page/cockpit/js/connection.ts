@@ -112,6 +112,7 @@ export class Connection {
       this.#settle(id, { ok: false, text: 'The connection broke before the answer came.' });
     }
     this.#store.setConnected(false);
+    this.#store.serverClock.forget();
     if (!this.#closed) {
       this.#retryTimer = setTimeout(() => this.#open(), this.#retry_ms);
       this.#retry_ms = Math.min(2 * this.#retry_ms, LAST_RETRY_MS);
@@ -127,7 +128,9 @@ export class Connection {
     if (message.type === 'reply') {
       this.#settle(message.to, message);
     } else if (message.type === 'pong') {
-      this.#store.round_trip_ms = performance.now() - message.t;
+      const now_ms = performance.now();
+      this.#store.round_trip_ms = now_ms - message.t;
+      this.#store.serverClock.add(message.t, now_ms, message.steady_s);
     } else {
       this.#store.receive(message);
     }

@@ -330,7 +330,7 @@ export type StoreMessage = HelloMessage | SceneMessage | SeatsMessage | SignalsM
 // Answers of the server to one page.
 export interface Reply { ok: boolean; text: string }
 export interface ReplyMessage extends Reply { type: 'reply'; to: number }
-export interface PongMessage { type: 'pong'; t: number }
+export interface PongMessage { type: 'pong'; t: number; steady_s: number }
 export type ServerMessage = StoreMessage | ReplyMessage | PongMessage;
 
 // Messages from the page, as the server declares them; requests get their number when they are

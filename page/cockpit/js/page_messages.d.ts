@@ -168,6 +168,8 @@ export interface TaskDone {
   delay_ms?: number | null;
   picture_ms?: number | null;
   paused_ms?: number | null;
+  steady_s?: number | null;
+  clock_error_ms?: number | null;
 }
 
 /** An event or a task is triggered. */

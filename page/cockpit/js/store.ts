@@ -6,6 +6,7 @@ import { CriticalityLog } from './criticality.js';
 import { DisplayClock } from './display_clock.js';
 import { decodeFrame, KIND } from './frames.js';
 import { addToHistory, emptyHistory } from './history.js';
+import { ServerClock } from './server_clock.js';
 import { extrapolateVehicles, interpolateVehicles, moveObjects } from './interpolation.js';
 import { Perceived } from './perceived.js';
 import { SampleRing } from './samples.js';
@@ -89,6 +90,8 @@ export class Store {
   framedBy = '';
   connected = false;
   round_trip_ms = NaN;
+  /** The clock of the server's machine. */
+  serverClock = new ServerClock();
 
   /** Counts resets; -1 before the first frame. */
   epoch = -1;

@@ -7,6 +7,9 @@ import { FIELD_OF_VIEW } from '../view3d/field_of_view.js';
 
 import type { StageView } from './stage_messages.js';
 
+/** Corners of the view for a photodiode. */
+export const CORNERS = ['top-left', 'top-right', 'bottom-left', 'bottom-right'] as const;
+
 export interface StageAddress {
   seat: string; // id of the vehicle that is driven
   view: StageView; // at first
@@ -17,6 +20,7 @@ export interface StageAddress {
   mirrors: boolean; // whether the driver has them
   change: boolean; // whether V and C change the view
   fieldOfView_deg: number | null; // across the picture; null for the browser's own [deg]
+  corner: typeof CORNERS[number] | null; // that is white while a stimulus is shown
   lang: 'en' | 'de'; // of the texts of the stage
 }
 
@@ -41,6 +45,7 @@ export function readStage(query: string): StageAddress | null {
     map: flag('map', true), names: flag('names', false), plans: flag('plans', false),
     sound: flag('sound', true), mirrors: flag('mirrors', true), change: flag('change', false),
     fieldOfView_deg: angle >= FIELD_OF_VIEW.least && angle <= FIELD_OF_VIEW.most ? angle : null,
+    corner: CORNERS.find((name) => name === values.get('corner')) ?? null,
     lang: values.get('lang') === 'de' ? 'de' : 'en',
   };
 }

@@ -4,6 +4,7 @@
 
 import type { GameTask, OpenPrompt, PageTimes } from './task_messages.js';
 import type { RunningTime } from './running_time.js';
+import type { ServerTime } from '../server_clock.js';
 
 /** A prompt from its message to its end. All times are those of performance.now [ms]. */
 export class Prompt {
@@ -11,6 +12,8 @@ export class Prompt {
   drawn_ms = NaN;
   /** Time from then to the beginning of the next picture. */
   picture_ms = NaN;
+  /** The first picture's time on the server's clock; null where this is not known. */
+  shown: ServerTime | null = null;
   /** Whether it was answered here. */
   answered = false;
 
@@ -60,7 +63,7 @@ export class Prompt {
   /** @param answer_ms when it was answered */
   times(answer_ms?: number): PageTimes {
     const delay_ms = this.drawn_ms - this.#received_ms + this.#way_ms;
-    const seen = { delay_ms, picture_ms: this.picture_ms };
+    const seen = { delay_ms, picture_ms: this.picture_ms, ...this.shown };
     return answer_ms === undefined ? seen
       : { ...seen, response_ms: this.since(answer_ms), paused_ms: this.#paused(answer_ms) };
   }

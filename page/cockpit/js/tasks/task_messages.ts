@@ -38,6 +38,8 @@ export interface PageTimes {
   delay_ms?: number;
   picture_ms?: number;
   paused_ms?: number;
+  steady_s?: number; // the first picture, by the server's steady clock [s]
+  clock_error_ms?: number;
 }
 
 export interface TaskReportMessage extends PageTimes {

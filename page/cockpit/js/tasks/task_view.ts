@@ -22,6 +22,7 @@ export class TaskView {
   frame;
   note;
   answerButton;
+  corner;
   root;
 
   /** @param stage that it covers */
@@ -40,9 +41,10 @@ export class TaskView {
     this.note = element('p', { class: 'task-note', role: 'status', hidden: true });
     this.answerButton = element('button', { type: 'button', class: 'task-answer', tabindex: '-1',
       hidden: true });
+    this.corner = element('div', { class: 'task-corner', 'aria-hidden': 'true', hidden: true });
     // The light comes last, so that nothing hides it.
     this.root = element('div', { id: 'tasks' }, this.frame, this.note, this.request,
-      this.answerButton, this.light);
+      this.answerButton, this.light, this.corner);
     stage.append(this.root);
   }
 

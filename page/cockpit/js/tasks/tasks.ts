@@ -174,6 +174,7 @@ export class Tasks {
     }).then(({ drawn_ms, picture_ms }) => {
       prompt.draw(drawn_ms);
       prompt.picture_ms = picture_ms;
+      prompt.shown = this.#store.serverClock.at(drawn_ms);
       this.#send(prompt, 'shown', prompt.times());
     });
     if (!light && !open.seen && this.#store.scene?.sound !== 'none') {
@@ -215,6 +216,7 @@ export class Tasks {
     this.#view.light.hidden = !this.prompts.some((prompt) => prompt.task.kind
       === 'detection_response' && prompt.lit(now_ms));
     const request = this.#request;
+    this.#drawCorner(!this.#view.light.hidden || request !== undefined);
     if (request === undefined) {
       this.#tone.stop();
       this.#view.showRequest(null);
@@ -226,6 +228,21 @@ export class Tasks {
       hint: request.free ? this.#words.takeOverHint.replace('{key}', keyName(task.key ?? ''))
         : this.#words.hold,
     });
+  }
+
+  /**
+   * Draw the corner for a photodiode, if the address names one.
+   *
+   * @param lit whether a stimulus is in the same picture
+   */
+  #drawCorner(lit: boolean) {
+    const { corner } = this.#view;
+    const where = window.crgame.stage?.address.corner ?? null;
+    corner.hidden = where === null;
+    if (where !== null) {
+      corner.dataset.corner = where;
+      corner.classList.toggle('lit', lit);
+    }
   }
 
   /** @param at_ms time of the answer */
@@ -258,7 +275,7 @@ export class Tasks {
   #send({ open }: Prompt, what: 'shown' | 'answer', times: PageTimes) {
     const known = Object.fromEntries(Object.entries(times)
       .filter(([, value]) => Number.isFinite(value))
-      .map(([name, value]) => [name, Math.round(1000 * value) / 1000]));
+      .map(([name, value]) => [name, Math.round(1e6 * value) / 1e6]));
     this.#connection.send({ type: 'task', seat: open.seat, task: open.task, number: open.number,
       what, ...known });
   }
