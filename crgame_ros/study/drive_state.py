@@ -32,6 +32,7 @@ class DriveState:
     :param item: id of the session's item that is driven; empty without one.
     :param attempt: at it, from 1 on; 0 before the first cycle.
     :param link: address of the cockpit's page for the participant; empty if not available.
+    :param watch: address of a page that shows the drive; empty if not available.
     :param time_s: the run's clock [s]; None before the first cycle.
     :param text: for the experimenter: the present work, or the failure.
     :param doubts: what of the drive's data is beyond a bound of the study so far.
@@ -41,6 +42,7 @@ class DriveState:
     item: str = ''
     attempt: int = 0
     link: str = ''
+    watch: str = ''
     time_s: float | None = None
     text: str = ''
     doubts: tuple[str, ...] = ()

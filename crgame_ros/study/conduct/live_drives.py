@@ -338,9 +338,11 @@ class LiveDrives:
 
     def _set_phase(self, phase: DrivePhase, item: str = '', text: str = '', *, attempt: int = 0,
                    drive: StudyDrive | None = None) -> None:
-        link = '' if drive is None or self._graph is None \
-            else drive.link(self._graph.cockpit, self._language(), self._key)
-        state = DriveState(phase, item, attempt, link, None, text)
+        link = watch = ''
+        if drive is not None and self._graph is not None:
+            link = drive.link(self._graph.cockpit, self._language(), self._key)
+            watch = drive.watch_link(self._graph.cockpit)
+        state = DriveState(phase, item, attempt, link, watch, None, text)
         if state != self._state:
             self._state = state
             self._tell()

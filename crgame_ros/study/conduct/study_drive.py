@@ -145,6 +145,10 @@ class StudyDrive:
              **({} if settings.photodiode is None else {'corner': settings.photodiode}),
              'lang': language, 'key': key})
 
+    def watch_link(self, cockpit: str) -> str:
+        """Return the address of a page that only shows the drive."""
+        return f'{cockpit.rstrip("/")}/?' + urlencode({'view': 'chase', 'vehicle': self.seat})
+
 
 def write_drive(item: SessionItem, games: Path) -> StudyDrive | None:
     """

@@ -11,6 +11,7 @@ from crgame_ros.study.desk.page_markdown import read_tree
 from crgame_ros.study.drive_state import DrivePhase
 from crgame_ros.study.file import Break, DeviceCheck, Page, Questions
 from crgame_ros.study.pages import questionnaire_name
+from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.question import (
     ChoiceQuestion,
     LikertQuestion,
@@ -164,8 +165,19 @@ def experimenter_document(desk: Desk, page: Mapping[str, object]) -> dict[str, o
         'waits': desk.waits, 'ending': desk.ending,
         'over': how_over(desk) if item is None else '', 'can_abort': desk.can_abort,
         'drive': {'phase': state.phase.value, 'item': state.item, 'attempt': state.attempt,
-                  'time_s': state.time_s, 'text': state.text, 'doubts': list(state.doubts)},
+                  'time_s': state.time_s, 'text': state.text, 'doubts': list(state.doubts),
+                  'watch': state.watch},
+        'pause_h': _pause_h(session),
         'items': _items(desk), 'log': _log(desk)}
+
+
+def _pause_h(session: ParticipantSession) -> float:
+    """Return how long nothing happened before the session was opened last [h]."""
+    entries = session.journal.entries
+    opened = next((index for index in range(len(entries) - 1, 0, -1)
+                   if entries[index]['entry'] == SessionEvent.OPENED), 0)
+    return round((entries[opened]['at'] - entries[opened - 1]['at']) / 3600.0, 1) \
+        if opened else 0.0
 
 
 def _items(desk: Desk) -> list[dict[str, object]]:

@@ -286,8 +286,8 @@ def _cookie_name(request: web.Request, access: Access) -> str:
 
 
 def _frames(request: web.Request, desk: Desk) -> str:
-    """Return the allowed origins of the cockpit's frame: this machine, at any port."""
-    if request.path != '/':
+    """Return the allowed origins of frames with the drive: this machine, at any port."""
+    if request.path not in ('/', '/experimenter'):
         return "'none'"
     host = urlsplit(f'//{request.host}').hostname or ''
     names = dict.fromkeys((host, *(_LOOPBACK if is_loopback(host) else ())))

@@ -5,12 +5,15 @@
 import { element, part, setAttribute, setText } from '../../cockpit/js/dom.js';
 import { DeskConnection } from './desk_connection.js';
 import { entryWords, timeOfDay } from './log_words.js';
+import { stageAddress } from './drive_frame.js';
 import { askReason } from './reason_dialog.js';
 
 import type { ReplyMessage } from '../../cockpit/js/messages.js';
 import type { ExperimenterDocument, ItemRow } from './experimenter_messages.js';
 import type { ExperimenterMessage, Unnumbered } from './page_messages.js';
 
+// After such a pause the experimenter is told: what was practised may be forgotten [h].
+const LONG_PAUSE_H = 6;
 const MARKER_KEYS = ['F1', 'F2', 'F3', 'F4', 'F5', 'F6', 'F7', 'F8', 'F9'];
 
 type Received = ExperimenterDocument | ReplyMessage;
@@ -44,6 +47,7 @@ class ExperimenterPage {
   };
 
   constructor() {
+    part(document.body, 'watch').addEventListener('toggle', () => this.#showDrive());
     part(document.body, 'orders').append(...Object.values(this.#orders));
     this.#orders.end.classList.add('danger');
     const note = part(document.body, 'note') as HTMLTextAreaElement;
@@ -126,6 +130,7 @@ class ExperimenterPage {
       + `${shown.place + 1}${shown.language ? `, language ${shown.language}` : ''}`);
     this.#showPage(shown);
     this.#showNow(shown);
+    this.#showDrive();
     this.#showMarkers(shown.markers);
     this.#showItems(shown.items);
     this.#showLog(shown);
@@ -163,6 +168,10 @@ class ExperimenterPage {
     if (shown.page.error) {
       lines.push(shown.page.error);
     }
+    if (shown.pause_h >= LONG_PAUSE_H && !over) {
+      lines.push(`The session goes on after ${Math.round(shown.pause_h)} hours. `
+        + 'Practice can be repeated in the list below.');
+    }
     if (shown.ending && !over) {
       lines.push('The session ends as soon as the drive is over.');
     } else if (shown.waits) {
@@ -178,6 +187,21 @@ class ExperimenterPage {
     setAttribute(this.#orders.abort, 'disabled', !shown.can_abort);
     setAttribute(this.#orders.skip, 'disabled', Boolean(over) || shown.can_abort);
     setAttribute(this.#orders.end, 'disabled', Boolean(over || shown.ending));
+  }
+
+  /** Show the drive in a small frame while it is opened; closed, it costs nothing. */
+  #showDrive() {
+    const node = part(document.body, 'watch') as HTMLDetailsElement;
+    const link = stageAddress(this.#shown?.drive.watch ?? '', window.location)?.href ?? '';
+    node.hidden = link === '';
+    const frame = node.querySelector('iframe');
+    const wanted = node.open ? link : '';
+    if ((frame?.src ?? '') !== wanted) {
+      frame?.remove();
+      if (wanted !== '') {
+        node.append(element('iframe', { src: wanted, title: 'The drive', tabindex: '-1' }));
+      }
+    }
   }
 
   #showMarkers(markers: string[]) {
@@ -214,6 +238,13 @@ class ExperimenterPage {
       element('td', { text: row.attempts ? `${row.attempts}` : '' }),
       element('td', {}, repeat));
     }));
+    // The list follows the session, but stays where the experimenter has scrolled it meanwhile.
+    const now = body.querySelector<HTMLElement>('[aria-current]');
+    const box = body.closest<HTMLElement>('.scrolled');
+    if (now && box && body.dataset.now !== now.textContent) {
+      body.dataset.now = now.textContent ?? '';
+      box.scrollTop = now.offsetTop - box.clientHeight / 3;
+    }
   }
 
   #showLog({ log }: ExperimenterDocument) {

@@ -28,6 +28,7 @@ export interface DriveNow {
   time_s: number | null;
   text: string;
   doubts: string[]; // what of its data is beyond a bound of the study
+  watch: string; // address of a page that shows the drive; empty for none
 }
 
 export type LogEntry = { entry: string; at: number; [name: string]: unknown }; // of the journal
@@ -49,6 +50,7 @@ export interface ExperimenterDocument {
   over: '' | 'done' | 'declined' | 'ended';
   can_abort: boolean;
   drive: DriveNow;
+  pause_h: number; // how long nothing happened before the session was opened last [h]
   items: ItemRow[];
   log: LogEntry[];
 }
