@@ -12,7 +12,7 @@ from crgame_ros.schema.marks import Advice, Listed, Within, Wording
 MAX_INLETS = 16
 # The first words of markers, by which triggers choose them.
 MARKER_KINDS = ('trial', 'event', 'task', 'stimulus', 'shown', 'answer', 'missed', 'take_over',
-                'contact')
+                'contact', 'marker')
 # A trigger is one byte, and amplifiers take 0 for none.
 LARGEST_CODE = 255
 _SEE = 'see docs/instruments.md for the keys'

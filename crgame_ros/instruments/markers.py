@@ -28,11 +28,14 @@ class Marker(NamedTuple):
     :param text: its words.
     :param n: simulation step at which it happened; None: at the newest.
     :param after_s: wall time from that step to when it happened [s]
+    :param steady_s: when it happened, on the machine's steady clock, where a page has told it [s];
+        it goes before `after_s`.
     """
 
     text: str
     n: int | None = None
     after_s: float = 0.0
+    steady_s: float | None = None
 
 
 class RunMarkers:
@@ -89,14 +92,15 @@ class RunMarkers:
         if entry.what in ('stimulus', 'request'):
             self._onsets[key] = entry.n
         onset_n, times = self._onsets.get(key), entry.times
+        answer_ms = 0.0 if entry.what == 'shown' or times.response_ms is None \
+            else times.response_ms + (times.paused_ms or 0.0)
+        if times.steady_s is not None and (entry.what == 'shown' or times.response_ms is not None):
+            return Marker(text, entry.n, 0.0, times.steady_s + 1e-3 * answer_ms)
         if onset_n is None or entry.what not in ('shown', 'answer') or times.delay_ms is None:
             return Marker(text, entry.n)
-        after_ms = times.delay_ms
-        if entry.what == 'answer':
-            if times.response_ms is None:
-                return Marker(text, entry.n)
-            after_ms += times.response_ms + (times.paused_ms or 0.0)
-        return Marker(text, onset_n, 1e-3 * after_ms)
+        if entry.what == 'answer' and times.response_ms is None:
+            return Marker(text, entry.n)
+        return Marker(text, onset_n, 1e-3 * (times.delay_ms + answer_ms))
 
     def of_drivers(self, document: DrivingSpells) -> list[Marker]:
         """Return the markers of seats whose source has changed since the run's start."""
@@ -113,6 +117,17 @@ class RunMarkers:
                 found.append(Marker(_words('take_over', word, spell.seat, spell.source),
                                     spell.from_n))
         return found
+
+    def of_study(self, status: Status) -> list[Marker]:
+        """Return the markers of a study: the trial that is driven, the experimenter's markers."""
+        node, _, subject = status.name.partition(': ')
+        if node != 'study_node':
+            return []
+        values = status.values
+        if subject == 'trial':
+            return [Marker(_words('trial', values.get('item', ''), values.get('condition', ''),
+                                  values.get('attempt', '')))]
+        return [Marker(_words('marker', status.text))] if subject == 'marker' else []
 
     def of_drivability(self, status: Status) -> list[Marker]:
         """Return the markers of contacts that have begun."""

@@ -110,7 +110,8 @@ class RunStreams:
             start_s = self.starts.steady_s(newest if marker.n is None else marker.n)
             outlet = self._outlets.get(MARKERS.name)
             if outlet is not None and start_s is not None:
-                outlet.push([marker.text], start_s + marker.after_s)
+                outlet.push([marker.text], start_s + marker.after_s
+                            if marker.steady_s is None else marker.steady_s)
 
 
 class InstrumentsNode(Node):
@@ -134,6 +135,7 @@ class InstrumentsNode(Node):
                 DRIVERS.read(text))),
             (endpoints.polled(RUN_STATE.topic), lambda run, text: run.of_state(
                 RUN_STATE.read(text)))]
+        self._diagnostics = endpoints.polled('/diagnostics', depth=100)
         self._drivability: dict[str, PolledSubscription] = {}
         self._documents = endpoints.publisher(STREAMS.topic)
         self._samples = endpoints.publisher(SAMPLES_TOPIC)
@@ -280,11 +282,12 @@ class InstrumentsNode(Node):
                         self._tell(read(self._markers, message.data))
                 except InputError as error:
                     self._endpoints.refusals.note(error.where, str(error))
-        for slot in self._drivability.values():
+        for slot, of in ((self._diagnostics, RunMarkers.of_study), *(
+                (each, RunMarkers.of_drivability) for each in self._drivability.values())):
             while (message := slot.pop()) is not None:
                 for status in map(read_status, message.status):
                     if self._markers is not None:
-                        self._tell(self._markers.of_drivability(status))
+                        self._tell(of(self._markers, status))
 
     def _tell(self, markers: Sequence[Marker]) -> None:
         """Send triggers at once, and markers with the time of their step."""

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Markers out of a run's messages: each once, at the time of what happened."""
 
+from dataclasses import replace
+
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import FiredEvents, RunState
 from crgame_ros.game.events import FiredEvent
@@ -100,3 +102,28 @@ def test_the_query_finds_what_has_all_that_is_given() -> None:
     spec = _spec('inlets: [Gaze, {type: ECG, source_id: a1}]')
     assert [inlet.predicate() for inlet in spec.inlets] == [
         "name='Gaze'", "type='ECG' and source_id='a1'"]
+
+
+def test_a_page_that_knows_the_clock_places_its_marker_itself() -> None:
+    """The picture at 1000.5 s of the steady clock, the answer 0.4 s and a pause of 1 s later."""
+    run = RunMarkers(0)
+    shown = PageTimes(delay_ms=40.0, steady_s=1000.5, clock_error_ms=0.2)
+    answer = replace(shown, response_ms=400.0, paused_ms=1000.0)
+    found = run.of_tasks(TaskLog(0, (
+        TaskEntry(100, 'drt', 'detection_response', 'hv0', 'stimulus', 1),
+        TaskEntry(105, 'drt', 'detection_response', 'hv0', 'shown', 1, '', shown),
+        TaskEntry(250, 'drt', 'detection_response', 'hv0', 'answer', 1, 'hit', answer))))
+    assert [(each.text, each.steady_s) for each in found] == [
+        ('stimulus/drt/hv0/1', None), ('shown/drt/hv0/1', 1000.5),
+        ('answer/drt/hv0/1/hit', 1001.9)]
+
+
+def test_a_study_names_its_trials_and_markers() -> None:
+    """A slash in an item's name would make two words of it."""
+    run = RunMarkers(0)
+    told = Status.of('study_node: trial', 0, 'text', {
+        'item': 'main/2', 'condition': 'idm/dense', 'attempt': 1})
+    assert run.of_study(told) == [Marker('trial/main_2/idm_dense/1')]
+    assert run.of_study(Status.of('study_node: marker', 0, 'brakes late', {})) == [
+        Marker('marker/brakes late')]
+    assert run.of_study(Status.of('study_node: note', 0, 'private', {})) == []

@@ -217,6 +217,10 @@ class LiveDrives:
         while director.status.run != 'ended':
             if director.status.run == 'running' and not began_at_s:
                 began_at_s = time.time()
+                condition = item.what.condition.name if isinstance(item.what, PlannedTrial) \
+                    else 'practice'
+                director.record('trial', f'{item.id}: {condition}, attempt {attempt}',
+                                item=item.id, condition=condition, attempt=attempt)
                 self._set_phase(DrivePhase.DRIVING, item.id, attempt=attempt, drive=drive)
             if began_at_s and self._abort is None:
                 self._abort = disturbance.check(director.status.seats_lost.get(drive.seat, False))
