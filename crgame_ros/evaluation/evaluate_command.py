@@ -12,8 +12,6 @@ from typing import Any, get_args, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.file_names import GRID_FILE, REPORTS, SEARCH_FILE
-from crgame_ros.evaluation.folder import EvaluationFolder
-from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.evaluation.summary.command import add_summary_arguments
 from crgame_ros.game.variation_spec import Sampling
 from crgame_ros.library.lookup import names_file
@@ -38,6 +36,8 @@ def report_cell(folder: Path, key: str, say: Callable[[str], object]) -> Path:
     from crgame_ros.analysis.report.file import write_report
     from crgame_ros.analysis.runs.run import Run
     from crgame_ros.evaluation.cell_run import run_cell
+    from crgame_ros.evaluation.folder import EvaluationFolder
+    from crgame_ros.evaluation.source_digest import engine_digest
     from crgame_ros.recording.export import prepare_folder, write_scenario
     from crgame_ros.recording.offline_recording import write_recording
     place = EvaluationFolder(folder)
@@ -146,6 +146,7 @@ def run_command(values: argparse.Namespace) -> int:
 
 
 def _inspect(values: argparse.Namespace) -> int:
+    from crgame_ros.evaluation.folder import EvaluationFolder
     from crgame_ros.evaluation.summary.command import summarise_command
     if values.plan is None or not values.plan.is_dir():
         raise InputError('needs the folder of an evaluation',

@@ -11,11 +11,11 @@ import sys
 
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.occupancy.command import write_map
 from crgame_ros.occupancy.map_file import RasterSpec
 from crgame_ros.occupancy.occupancy import OccupancyGrid
 from crgame_ros.occupancy.rasterize import draw, Raster
 from crgame_ros.occupancy.tiles import TiledOccupancy
+from crgame_ros.occupancy.written_map import write_map
 from crgame_ros.roads.boundary import RoadBoundary
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario, parse_scenario
 import numpy as np
@@ -321,7 +321,7 @@ def test_maps_that_are_refused() -> None:
 SLOW = """
 import os, sys, time
 from pathlib import Path
-from crgame_ros.occupancy import command as occupancy_command
+from crgame_ros.occupancy import written_map
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.occupancy.map_file import RasterSpec
 from crgame_ros.occupancy.rasterize import Raster
@@ -331,7 +331,7 @@ def progress(done, total):
     time.sleep(60.0)
 
 raster = Raster(load_scenario(Path(sys.argv[1])), RasterSpec())
-occupancy_command.write_map(raster, Path(sys.argv[2]), 'T', progress=progress)
+written_map.write_map(raster, Path(sys.argv[2]), 'T', progress=progress)
 """
 
 

@@ -9,11 +9,7 @@ import json
 from pathlib import Path
 import re
 
-from crgame_ros.evaluation.summary.command import (
-    add_summary_arguments,
-    summarise_command,
-    summary_text,
-)
+from crgame_ros.evaluation.summary.command import add_summary_arguments, summarise_command
 from crgame_ros.evaluation.summary.html_page import (
     interval_svg,
     PlottedInterval,
@@ -24,6 +20,7 @@ from crgame_ros.evaluation.summary.measures import MEASURES
 from crgame_ros.evaluation.summary.summarise import summarise
 from crgame_ros.evaluation.summary.summary import Summary
 from crgame_ros.evaluation.summary.tables import quantity
+from crgame_ros.evaluation.summary.text import summary_text
 from evaluation_rows import Evaluation, many
 import numpy as np
 from page_reader import Page

@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What each command loads before it has anything to do: few modules, and no large library."""
+
+import subprocess
+import sys
+
+from crgame_ros.cli import TOOLS
+import pytest
+
+# A bare argparse program loads about 90.
+MOST = 330
+LARGE = ('commonroad', 'shapely', 'scipy', 'matplotlib', 'pandas', 'pyarrow', 'rclpy', 'numba',
+         'distributed', 'lxml', 'aiohttp', 'pydantic', 'mcap', 'plotly')
+COUNT = """
+import contextlib, io, sys
+from crgame_ros.cli import main
+with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+    main(sys.argv[1:])
+print(len(sys.modules), *sorted(name for name in sys.modules if '.' not in name))
+"""
+
+
+@pytest.mark.parametrize('command', [tool.name for tool in TOOLS])
+def test_help_loads_little(command: str) -> None:
+    """`--help` answers in a blink: it loads what declares the arguments, and nothing more."""
+    done = subprocess.run([sys.executable, '-c', COUNT, command, '--help'], capture_output=True,
+                          text=True, check=True)
+    count, *names = done.stdout.split()
+    assert int(count) <= MOST
+    assert not {*LARGE} & {*names}
