@@ -170,11 +170,12 @@ def test_what_the_person_in_a_seat_hears_and_sees_is_told(setup: Setup) -> None:
         page.view = SeenView(
             shown='driver', inset=True, plans=False, mirrors=False, bare=False, software=False,
             across_deg=75.0, ratio=0.5, rate_hz=30.0, renderer='a card', width_px=1280.0,
-            height_px=720.0)
+            height_px=720.0, away='focus', full_screen=True)
         seen = {'shown': 'driver', 'inset': 'true', 'plans': 'false', 'mirrors': 'false',
                 'bare': 'false', 'across_deg': '75.0', 'screen_width_m': '',
                 'eye_distance_m': '', 'width_px': '1280', 'height_px': '720', 'ratio': '0.500',
-                'rate_hz': '30.0', 'renderer': 'a card', 'software': 'false'}
+                'rate_hz': '30.0', 'renderer': 'a card', 'software': 'false',
+                'away': 'focus', 'full_screen': 'true', 'device': ''}
         await graph.until(lambda: told(graph, 'view')[-1][1] == seen, 'the new view')
         assert told(graph, 'view')[-1][0] == OFFSET_NS + 200_000_000
     lived(check)
