@@ -21,6 +21,8 @@ from crgame_ros.study.trial_game import trial_game
 from crgame_ros.whole_file import write_whole
 
 DRIVES, FILES = 'drives.json', 'files'
+# In the folder of a study: a line for each withdrawal, and those that have not finished.
+WITHDRAWALS, WITHDRAWING = 'withdrawals.jsonl', '.withdrawing'
 
 
 def keep_drives(study: StudyFile, folder: Path) -> None:
@@ -77,17 +79,40 @@ def _difference(before: object, now: object, where: str = '') -> str:
 
 
 _ID = re.compile(r'[A-Za-z0-9][A-Za-z0-9_-]{0,31}')
+# What R, pandas, YAML or a spreadsheet reads as a missing value, a truth value or infinity.
+_WORDS = frozenset(('na', 'nan', 'null', 'nil', 'none', 'nat', 'inf', 'infinity', 'true', 'false',
+                    't', 'f', 'yes', 'no', 'y', 'n', 'on', 'off'))
+# A spreadsheet makes a date of MAR1, SEPT2 and Dec-5.
+_MONTH = re.compile(r'(jan|feb|mar|apr|may|jun|jul|aug|sept?|oct|nov|dec|january|february|march|'
+                    r'april|june|july|august|september|october|november|december)-?[0-9]{1,4}',
+                    re.IGNORECASE)
 
 
 def check_participant(name: str) -> str:
     """
-    Check an anonymous id.
+    Check the form of an anonymous id.
 
     :raises InputError: if it is not valid.
     """
     if _ID.fullmatch(name) is None:
         raise InputError('is no id of a participant', name[:40] or '--participant',
                          'give 1 to 32 letters, digits, - and _, such as P07')
+    return name
+
+
+def check_new_participant(name: str) -> str:
+    """
+    Check the id of a participant who has not begun: every reader of tables has to leave it as is.
+
+    :raises InputError: if it is not valid, or some reader takes it for a number, a date, a truth
+        value or a missing value.
+    """
+    check_participant(name)
+    if name[0].isdigit() or name.lower() in _WORDS or _MONTH.fullmatch(name) is not None:
+        kind = 'number or a date' if name[0].isdigit() else 'missing or a truth value' \
+            if name.lower() in _WORDS else 'date'
+        raise InputError(f'is an id that some programs read as a {kind}', name,
+                         f'put a letter before it, such as P{name}')
     return name
 
 
@@ -121,6 +146,28 @@ class StudyFolder:
         taken = {place for other in self.participants
                  for place in _places(self.participant(other))}
         return next(place for place in range(len(taken) + 1) if place not in taken)
+
+    def begin(self, name: str) -> None:
+        """
+        Check that a participant can begin, or go on.
+
+        :raises InputError: if the id is not valid, or its participant withdraws.
+        """
+        if not _places(self.participant(name)):
+            check_new_participant(name)
+        self.check_withdrawals()
+
+    def check_withdrawals(self) -> None:
+        """
+        Check that every withdrawal has been finished.
+
+        :raises InputError: if one was interrupted.
+        """
+        left = self.root / WITHDRAWING
+        for folder in sorted(left.iterdir()) if left.is_dir() else ():
+            raise InputError('a withdrawal was interrupted', str(folder),
+                             f'finish it: crgame study withdraw {self.root} --participant '
+                             f'{folder.name}')
 
     def keep_study(self, study: StudyFile, file: Path, pictures: Iterable[str] = ()) -> None:
         """

@@ -13,11 +13,14 @@ from typing import Any
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
 from crgame_ros.study.file import Page, StudyFile
+from crgame_ros.study.folder import StudyFolder
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_journal import JOURNAL, read_journal, SessionJournal
 from crgame_ros.study.session_script import PracticeDrives
 from crgame_ros.study.trial_plan import PlannedTrial
+import pandas
 import pytest
+import yaml
 
 STUDY = {
     'name': 'demo', 'seed': 3,
@@ -198,3 +201,24 @@ def test_what_was_said_comes_back_as_it_was(tmp_path: Path) -> None:
         assert [entry['text'] for entry in journal.entries] == [text, 'x']
         journal.add({'entry': 'note', 'at': 3.0, 'text': 'y'})
     assert [entry['text'] for entry in read_journal(tmp_path)] == [text, 'x', 'y']
+
+
+@pytest.mark.parametrize('name', ['007', '1e5', '1E5', '0x1f', '2026-01-02', 'NA', 'nan', 'null',
+                                  'TRUE', 'T', 'no', 'inf', 'MAR1', 'Dec-5', 'sept2026'])
+def test_ids_that_readers_change_are_refused_for_new_participants(tmp_path: Path,
+                                                                  name: str) -> None:
+    with pytest.raises(InputError, match=f'put a letter before it, such as P{name}'):
+        StudyFolder(tmp_path).begin(name)
+    with ParticipantSession(read(StudyFile, STUDY, 'study'), tmp_path / 'participants' / name,
+                            name, 0):
+        # One who has begun goes on.
+        StudyFolder(tmp_path).begin(name)
+
+
+def test_other_ids_are_the_same_in_every_reader(tmp_path: Path) -> None:
+    names = ['P07', 'p-1', 'Marie', 'E5', 'March', 'NA1', 'VP_003', 'ab12']
+    for name in names:
+        StudyFolder(tmp_path).begin(name)
+    (tmp_path / 'ids.csv').write_text('\n'.join(['id', *names]))
+    assert pandas.read_csv(tmp_path / 'ids.csv')['id'].tolist() == names
+    assert yaml.safe_load('[' + ', '.join(names) + ']') == names

@@ -124,6 +124,7 @@ Plan an experiment with people: who drives which trials in which order, and what
   crgame study data studies/my_study      # tables of what it has found so far
   crgame study report studies/my_study    # the same for people, one HTML file
   crgame study rerun studies/my_study --planner constant-velocity   # the same people again
+  crgame study withdraw studies/my_study --participant P07   # delete a participant's data
 
 docs/studies.md leads through an example."""
 
@@ -227,6 +228,7 @@ def run_command(values: argparse.Namespace) -> int:
     if values.place is not None and not 1 <= values.place <= 10_000:
         raise InputError(f'is {values.place}', '--place', 'give 1 to 10000')
     folder = StudyFolder(values.out or Path('studies') / study.name)
+    folder.begin(participant)
     folder.keep_study(study, values.file, pictures_of(study))
     place = folder.place_of(participant) if values.place is None else values.place - 1
     print_now(f'{participant}, place {place + 1} of {study.name}; data go to {folder.root}')

@@ -9,6 +9,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.recording.run_folder import PARTICIPANTS, STUDY_FILE
 from crgame_ros.study.data.participant_record import ParticipantRecord, read_participant
 from crgame_ros.study.file import load_study, StudyFile
+from crgame_ros.study.folder import WITHDRAWALS
 
 DATA = 'data'
 
@@ -34,6 +35,12 @@ class ConductedStudy:
     def data(self) -> Path:
         """Return the folder of the study's data."""
         return self.path / DATA
+
+    @property
+    def withdrawals(self) -> int:
+        """Return the number of participants whose data were deleted."""
+        log = self.path / WITHDRAWALS
+        return len(log.read_text('utf-8').splitlines()) if log.is_file() else 0
 
     def participants(self) -> list[ParticipantRecord]:
         """

@@ -34,6 +34,7 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
         'data_written_by': software_with_commit(),
         # As noted by the sessions: more than one if it changed during the study.
         'sessions_run_by': {record.id: record.software for record in data.records},
+        'withdrawals': folder.withdrawals,
         'conditions': {f'{block.name}: {condition.name}': _plain(write(condition.settings))
                        for block in study.blocks for condition in conditions_of(study, block)},
         'random_seeds': sorted({row['random_seed'] for row in _rows(data)

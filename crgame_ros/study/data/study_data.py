@@ -34,6 +34,7 @@ from crgame_ros.study.session_script import Fields
 import pyarrow as pa
 
 KEPT = '.runs'
+TABLE_NAMES = ('trials', 'participants', 'answers', 'events')
 _PARTICIPANT_COLUMNS = (
     PARTICIPANT, Column('place', INTEGER, '1', 'among all participants, from 1 on'),
     Column('language', TEXT, '', 'that was chosen', empty='not reported'),

@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The commands `crgame study data`, `report` and `rerun`."""
+"""The commands `crgame study data`, `report`, `rerun` and `withdraw`."""
 
 import argparse
+from datetime import datetime, UTC
 from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
 
+from crgame_ros.errors import InputError
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.study_data_folder import only_writer, write_study_data
 
@@ -41,6 +43,11 @@ def add_data_arguments(what: Any) -> None:
     rerun.add_argument('--workers', type=int, metavar='N',
                        help='processes (default: one for each processor)')
     rerun.set_defaults(command=rerun_command)
+    withdraw = what.add_parser('withdraw', help="delete a participant's data, everywhere")
+    withdraw.add_argument('folder', type=Path, help='of the study')
+    withdraw.add_argument('--participant', required=True, metavar='ID', help='whose data')
+    withdraw.add_argument('--yes', action='store_true', help='without asking')
+    withdraw.set_defaults(command=withdraw_command)
 
 
 def data_command(values: argparse.Namespace) -> int:
@@ -100,9 +107,40 @@ def rerun_command(values: argparse.Namespace) -> int:
     return 0
 
 
+def withdraw_command(values: argparse.Namespace) -> int:
+    """
+    Delete a participant's data.
+
+    :return: 1 if the answer was no.
+    :raises InputError: if there are none, the session is open, or something cannot be deleted.
+    """
+    from crgame_ros.study.data.withdrawal import Withdrawal
+    from crgame_ros.study.folder import check_participant
+    name = check_participant(values.participant)
+    withdrawal = Withdrawal(values.folder, name)
+    if not values.yes:
+        if not sys.stdin.isatty():
+            raise InputError('there is no terminal to ask in', 'study withdraw',
+                             'give --yes to delete without being asked')
+        for each in withdrawal.held():
+            print(f'to be deleted: {each.told()}')
+        print('Tables are then written anew without the participant. This cannot be undone.')
+        if input(f'Delete all data of {name}? Type {name}: ').strip() != name:
+            print('nothing was deleted')
+            return 1
+    foreign = withdrawal.carry_out(datetime.now(UTC).date(), print)
+    print(f'the data of {name} are deleted in {values.folder}')
+    for path in foreign:
+        print(f'not of this program, see yourself whether {name} is in it: {path}')
+    print('not reached: copies elsewhere, such as backups, exports, and what --out was given for')
+    return 0
+
+
 def _read(folder: Any, reports: bool = False) -> 'StudyData':
     from crgame_ros.recording.progress import Progress
     from crgame_ros.study.data.study_data import read_study_data
+    from crgame_ros.study.folder import StudyFolder
+    StudyFolder(folder.path).check_withdrawals()
     data = read_study_data(folder, _print, Progress(_print).tell, reports)
     for problem in data.problems:
         _print(f'note: {problem}')

@@ -54,10 +54,12 @@ def study_html(data: StudyData) -> str:
 def _facts(data: StudyData) -> list[tuple[str, str]]:
     complete = sum(record.complete for record in data.records)
     planned = sum(row['trials_planned'] for row in _rows(data, 'participants'))
+    withdrawn = data.folder.withdrawals
     flagged = sum(trial.row['timing_flag'] for trial in data.trials)
     return [
         ('participants', f'{len(data.records)}'), ('of them complete', f'{complete}'),
         ('planned', f'{data.folder.study.participants}'),
+        *([('withdrawn, data deleted', str(withdrawn))] if withdrawn else []),
         ('trials that count', f'{len(data.trials)} <small>of {planned}</small>'),
         ('without measures', str(len(data.problems))),
         ('beyond a bound of timing', str(flagged))]
