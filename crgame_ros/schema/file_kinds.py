@@ -9,7 +9,7 @@ import inspect
 import math
 from pathlib import Path
 import types
-from typing import Any, get_args, get_origin, Literal, NamedTuple
+from typing import Annotated, Any, get_args, get_origin, Literal, NamedTuple
 
 from crgame_ros.registry import ANY_VALUE
 from crgame_ros.schema.declaration import (
@@ -64,7 +64,8 @@ class _Describer:
         marks = (*marks, *own)
         special = mark_of(marks, Special)
         options = [special.json_schema()] if special is not None else [
-            self._one(choice, marks) for choice in choices_of(hint)
+            self.describe(choice, marks) if get_origin(choice) is Annotated
+            else self._one(choice, marks) for choice in choices_of(hint)
             if choice is not types.NoneType]
         if types.NoneType in choices_of(hint):
             options.append({'type': 'null'})

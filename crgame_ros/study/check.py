@@ -13,8 +13,9 @@ from crgame_ros.game.file import parse_game
 from crgame_ros.instruments.extra import require_instruments
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
-from crgame_ros.study.file import Block, Break, Page, Questions, StudyFile
-from crgame_ros.study.pages import page_file, questionnaire_name
+from crgame_ros.study.file import Block, Break, DeviceCheck, Page, Questions, StudyFile
+from crgame_ros.study.local_text import LocalText
+from crgame_ros.study.pages import page_file, questionnaire_name, steps_of
 from crgame_ros.study.questionnaire import load_questionnaire
 from crgame_ros.study.session_script import (
     drives_of,
@@ -129,27 +130,49 @@ def _try(settings: TrialSettings) -> None:
 
 
 def _steps(study: StudyFile) -> Iterator[StudyFinding]:
-    languages = dict.fromkeys((study.language, *study.languages))
-    steps = [entry.step for entries in (
-        study.before, study.after,
-        *(entries for block in study.blocks
-          for entries in (block.before, block.after_trial, block.after)))
-        for entry in entries]
-    for step in steps:
+    for name, texts in _texts(study):
+        yield from _untold(study, name, texts)
+    # A questionnaire that comes after several trials is one finding.
+    for step in dict.fromkeys(steps_of(study)):
         if isinstance(step, Page):
-            for language in languages:
-                if page_file(study, step, language) is None:
-                    yield StudyFinding('error', f'{study.base / step.file}: there is no such page')
-                    break
+            yield from _page(study, step)
         elif isinstance(step, Questions):
             try:
                 scale = load_questionnaire(questionnaire_name(study, step))
             except CrgameError as error:
                 yield StudyFinding('error', str(error))
                 continue
-            for language in languages:
-                if any(question.ask.lacks(language) for question in scale.questions):
-                    yield StudyFinding('warning', f'{step.name}: has no texts in "{language}"')
+            yield from _untold(study, step.name, (scale.title, scale.text, *(
+                text for question in scale.questions for text in question.texts)))
+        elif isinstance(step, Break | DeviceCheck):
+            yield from _untold(study, 'the text of a break or of the check of the controls',
+                               (step.text,))
+
+
+def _page(study: StudyFile, page: Page) -> Iterator[StudyFinding]:
+    """Yield the languages without a page; the first one may have the file without a language."""
+    for place, language in enumerate(study.all_languages):
+        file = page_file(study, page, language)
+        if file is None:
+            yield StudyFinding('error', f'{study.base / page.file}: there is no such page')
+            return
+        if place and file == study.base / page.file:
+            yield StudyFinding('warning', f'{page.file}: has no "{language}" version beside it, '
+                                          f'{file.with_suffix(f".{language}.md").name}')
+
+
+def _texts(study: StudyFile) -> Iterator[tuple[str, tuple[LocalText, ...]]]:
+    yield 'title', (study.title,)
+    for question in study.fields:
+        yield f'fields: {question.name}', question.texts
+
+
+def _untold(study: StudyFile, name: str, texts: Iterable[LocalText]) -> Iterator[StudyFinding]:
+    """Yield the languages in which some text is missing, so that another language is shown."""
+    texts = tuple(texts)
+    for language in study.all_languages:
+        if any(text.lacks(language) for text in texts):
+            yield StudyFinding('warning', f'{name}: has no texts in "{language}"')
 
 
 def _balance(study: StudyFile) -> Iterator[StudyFinding]:

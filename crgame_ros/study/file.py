@@ -14,6 +14,7 @@ from crgame_ros.study.local_text import LocalText, Text
 from crgame_ros.study.names import Name
 from crgame_ros.study.quality import QualityBounds
 from crgame_ros.study.question import Question
+from crgame_ros.study.retention import Retention
 from crgame_ros.study.trial_order import OrderKind
 from crgame_ros.study.trial_settings import Factor, NOTHING, TrialSettings
 from crgame_ros.yaml_text import read_yaml
@@ -28,12 +29,14 @@ class Page:
 
     :param file: Markdown; `consent.de.md` beside `consent.md` is the German version.
     :param consent: whether the participant has to agree; otherwise the study ends.
+    :param version: of a consent, as people name it; it is noted with a digest of the text.
     """
 
     FORM: ClassVar[Form] = Form(_SEE, short='file')
 
     file: Annotated[str, Wording(r'[^/\0][^\0]*\.md', 'name a Markdown file beside this one')]
     consent: bool = False
+    version: Annotated[str, Wording(r'[^\x00-\x1f]{0,60}', 'give 60 characters at most')] = ''
 
 
 @dataclass(frozen=True)
@@ -172,6 +175,7 @@ class StudyFile:
     :param participants: planned number, for the checks of balance.
     :param fields: questions to each participant at the start.
     :param markers: that the experimenter can set by a key during a session.
+    :param retention: until when the participants' data may be kept.
     :param quality: the bounds of data that hold, and what happens beyond them.
     :param settings: of all trials.
     :param factors: the factors of the experiment.
@@ -192,6 +196,7 @@ class StudyFile:
     participants: Annotated[int, Within(1, 10_000)] = 12
     fields: Annotated[tuple[Question, ...], Listed(0, 50, 'question', 'name')] = ()
     markers: Annotated[tuple[str, ...], Listed(0, 9, 'marker')] = ('marker',)
+    retention: Retention | None = None
     quality: QualityBounds = QualityBounds()
     settings: TrialSettings = NOTHING
     factors: Annotated[tuple[Factor, ...], Listed(0, 10, 'factor', 'name')] = ()

@@ -3,6 +3,7 @@
 """The folder of a study's data, with a folder for each participant."""
 
 from collections.abc import Iterable, Mapping
+from datetime import date, datetime, UTC
 import json
 from pathlib import Path
 import re
@@ -156,6 +157,22 @@ class StudyFolder:
         if not _places(self.participant(name)):
             check_new_participant(name)
         self.check_withdrawals()
+
+    def overdue(self, study: StudyFile, today: date) -> list[tuple[str, date]]:
+        """
+        Return the participants whose data are kept for too long, each with the last day.
+
+        :param today: by UTC.
+        """
+        if study.retention is None:
+            return []
+        found = []
+        for name in self.participants:
+            last = datetime.fromtimestamp(
+                read_journal(self.participant(name))[-1]['at'], UTC).date()
+            if (day := study.retention.last_day(last)) < today:
+                found.append((name, day))
+        return found
 
     def check_withdrawals(self) -> None:
         """

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finds the pages and questionnaires of a study."""
 
+import hashlib
 from pathlib import Path
 
+from crgame_ros.errors import InputError
 from crgame_ros.study.file import Page, Questions, Step, StudyFile
 from crgame_ros.study.question import Question
 from crgame_ros.study.questionnaire import load_questionnaire
@@ -29,6 +31,21 @@ def page_file(study: StudyFile, page: Page, language: str) -> Path | None:
         if file.is_file():
             return file
     return None
+
+
+def consent_of(study: StudyFile, page: Page, language: str) -> dict[str, str]:
+    """
+    Return what identifies a consent: its version, and the SHA-256 of the file in a language.
+
+    :raises InputError: if the file cannot be read.
+    """
+    file = page_file(study, page, language)
+    try:
+        content = b'' if file is None else file.read_bytes()
+    except OSError as error:
+        raise InputError(f'cannot be read ({error.strerror})', str(file), 'put it back') from error
+    return {'file': page.file if file is None else file.name, 'version': page.version,
+            'sha256': hashlib.sha256(content).hexdigest(), 'language': language}
 
 
 def questionnaire_name(study: StudyFile, step: Questions) -> str:

@@ -214,9 +214,9 @@ class ParticipantSession:
         """Record a marker of the experimenter or of a secondary task."""
         self._add(SessionEvent.MARKER, name=name, **told)
 
-    def end(self, reason: str) -> None:
+    def end(self, reason: str, **told: object) -> None:
         """End the session before its last item, for good."""
-        self._add(SessionEvent.ENDED, reason=reason)
+        self._add(SessionEvent.ENDED, reason=reason, **told)
 
     def _now(self) -> SessionItem:
         item = self.next_item

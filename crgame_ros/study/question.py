@@ -3,13 +3,13 @@
 """Questions of a study, and checks of their answers."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 import math
 from typing import Annotated, Any, ClassVar
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.schema.declaration import Form
-from crgame_ros.schema.marks import Advice, Keyed, Listed, Within, Wording
+from crgame_ros.schema.marks import Advice, Keyed, Listed, Within
 from crgame_ros.study.local_text import LocalText, Text
 from crgame_ros.study.names import ColumnName
 
@@ -135,7 +135,7 @@ class NumberQuestion:
     low: float = -_UNLIMITED
     high: float = _UNLIMITED
     whole: bool = False
-    unit: Annotated[str, Wording(r'[\s\S]{0,20}', 'give 20 characters at most')] = ''
+    unit: Text = LocalText()
 
     def refusal(self, answer: Any) -> str:
         """Return why an answer is invalid, empty if it is valid."""
@@ -190,6 +190,18 @@ class Question:
     kind: Annotated[QuestionKind, Keyed(KINDS, 'kind of answer')]
     ask: Annotated[Text, Advice('say what is asked')] = LocalText()
     required: bool = True
+
+    @property
+    def texts(self) -> tuple[LocalText, ...]:
+        """Return all texts that a participant reads in it."""
+        found = [self.ask]
+        for field in fields(self.kind):
+            value = getattr(self.kind, field.name)
+            found += [each for each in (value if isinstance(value, tuple) else (value,))
+                      if isinstance(each, LocalText)]
+        if isinstance(self.kind, ChoiceQuestion):
+            found += self.kind.texts.values()
+        return tuple(found)
 
     def refusal(self, answer: object) -> str:
         """Return why an answer is refused, empty if it is accepted; None means no answer."""

@@ -52,7 +52,7 @@ _TYPES: dict[str, type] = {
     **dict.fromkeys(('time_s', 'end_time_s', 'start_at', 'asked_at', 'shown_at', 'answered_at',
                      'taken_s', 'clean_s'), float),
     **dict.fromkeys(('held', 'good'), bool), **dict.fromkeys(('items', 'doubts'), list),
-    **dict.fromkeys(('answers', 'software', 'after_s', 'quality'), dict)}
+    **dict.fromkeys(('answers', 'software', 'after_s', 'quality', 'consent'), dict)}
 # Times of the wall clock are the largest numbers; until the year 5138 [s since 1970].
 _LARGEST = 1e11
 

@@ -7,12 +7,15 @@ from collections.abc import Iterator
 import csv
 import math
 from pathlib import Path
+import shutil
 import subprocess
 import sys
 from typing import Any
 
+from crgame_ros.cli import main
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.study.session_journal import read_journal
+from personal_files import unlisted_files
 import pytest
 from study_people import study_session, StudySession
 import yaml
@@ -56,6 +59,18 @@ def conducted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudySession
         session.run(PATIENCE_S, each)
         yield session
     assert not victims
+
+
+def test_every_file_is_among_those_with_personal_data(conducted: StudySession) -> None:
+    """A withdrawal then leaves nothing of the only participant."""
+    root = conducted.folder.parents[1]
+    assert unlisted_files(root) == []
+    copy = root.with_name('withdrawn')
+    shutil.copytree(root, copy)
+    assert main(['study', 'withdraw', str(copy), '--participant', 'P01', '--yes']) == 0
+    assert not any((copy / 'participants').iterdir())
+    assert not any('P01' in path.read_text('utf-8', 'replace')
+                   for path in copy.rglob('*') if path.is_file())
 
 
 def test_each_item_is_finished_once(conducted: StudySession) -> None:

@@ -76,7 +76,7 @@ def test_a_sample_belongs_to_one_run(recorder: Any, result: OfflineResult, tmp_p
     assert len(first['Heart'].values) + len(second['Heart'].values) == 54
     assert first['Heart'].values[:, 0].max() <= 1.01
     assert np.abs(second['Heart'].times_s + 1.0 - second['Heart'].values[:, 0]).max() < 6e-5
-    assert [item for item in second] == ['Heart']
+    assert list(second) == ['Heart']
 
 
 def test_what_is_no_sample_is_left_out(recorder: Any, samples: Any, result: OfflineResult,

@@ -11,6 +11,7 @@ import sys
 from crgame_ros.cli import main
 from crgame_ros.study.folder import StudyFolder, WITHDRAWALS
 from crgame_ros.study.session_journal import SessionJournal
+from personal_files import unlisted_files
 import polars
 import pytest
 from study_maker import Studied
@@ -49,6 +50,7 @@ def test_nothing_of_the_participant_is_left(copied: Path,
     """Tables, dictionary, BIDS, report, caches and reruns are gone or are of the others."""
     assert main(['study', 'report', str(copied)]) == 0
     assert main(['study', 'rerun', str(copied), '--planner', PLANNER, '--workers', '1']) == 0
+    assert unlisted_files(copied) == []
     kept = set((copied / 'data' / '.runs').iterdir())
     (copied / 'data' / 'mine.R').write_text('# of the researcher\n')
     before = traces(copied)
@@ -86,6 +88,7 @@ def test_an_interrupted_withdrawal_finishes(copied: Path, lines: int) -> None:
         for _ in range(lines):
             assert process.stdout.readline().startswith('deleted ')
         process.send_signal(signal.SIGKILL)
+    assert unlisted_files(copied) == []
     assert main(['study', 'data', str(copied)]) == 2
     assert withdraw(copied) == 0
     assert traces(copied) == [] and not (copied / '.withdrawing').exists()

@@ -15,6 +15,7 @@ from crgame_ros.game.file import load_game, parse_game
 from crgame_ros.occupancy.map_file import map_text
 from crgame_ros.paths import config_directory, scenarios_directory
 from crgame_ros.schema.file_kinds import FILE_KINDS
+from crgame_ros.study.questionnaire import SCALES
 from jsonschema import Draft202012Validator
 import pytest
 import yaml
@@ -28,7 +29,9 @@ FILES = {
     'device': sorted((config_directory() / 'devices').glob('*.yaml')),
     'timeline': sorted(path for ending in ('keys', 'joy')
                        for path in scenarios_directory().glob(f'*.{ending}.yaml')),
-    'control': [config_directory() / 'control.yaml']}
+    'control': [config_directory() / 'control.yaml'],
+    'study': [config_directory() / 'studies' / 'example' / 'study.yaml'],
+    'questionnaire': sorted(SCALES.glob('*.yaml'))}
 WHOLE = """\
 scenario: a.xml
 rate: 200
@@ -150,6 +153,13 @@ def test_reader_and_schema_refuse_the_same(seed: int) -> None:
         assert found.is_valid(values) == (reason is None), (
             reason, [error.message for error in found.iter_errors(values)], values)
     assert 60 < refused < 175
+
+
+@pytest.mark.parametrize(('seed', 'fits'), [(3, True), ('each', True), (-1, False), ('x', False)])
+def test_a_marked_type_of_several_is_described_too(seed: object, fits: bool) -> None:
+    """The seed of a study's settings is a number within bounds, or one word."""
+    study = {'name': 'demo', 'blocks': [{'name': 'main'}], 'settings': {'seed': seed}}
+    assert validator('study').is_valid(study) == fits
 
 
 def test_every_key_is_described() -> None:

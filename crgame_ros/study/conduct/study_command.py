@@ -18,7 +18,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.paths import config_directory, scenarios_directory
 from crgame_ros.software import software_with_commit
 from crgame_ros.study.conduct.live_drives import LiveDrives
-from crgame_ros.study.data.study_data_command import add_data_arguments
+from crgame_ros.study.data.study_data_command import add_data_arguments, told_overdue
 from crgame_ros.study.desk.desk import Desk
 from crgame_ros.study.desk.server import serve_desk
 from crgame_ros.study.file import StudyFile
@@ -152,6 +152,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     check.add_argument('file', type=Path, help='study file')
     check.add_argument('--participants', type=int, metavar='N',
                        help='print the orders of so many (default: 4)', default=4)
+    check.add_argument('--out', type=Path, metavar='DIR', help="folder of the study's data, whose "
+                       'participants may be past retention (default: studies/NAME)')
     check.set_defaults(command=check_command)
     add_data_arguments(what)
 
@@ -193,6 +195,8 @@ def check_command(values: argparse.Namespace) -> int:
         raise InputError(f'is {values.participants}', '--participants', 'give 0 to 10000')
     study = load_study(values.file)
     say = partial(print, file=sys.stderr, flush=True)
+    for line in told_overdue(study, values.out or Path('studies') / study.name):
+        say(f'warning: {line}')
     findings = check_study(study, Progress(say, 'driving a second of each condition'))
     for finding in findings:
         say(f'{finding.kind}: {finding.text}')

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The data of a study so far, as tables that can be rewritten while it goes on."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 import fcntl
 from pathlib import Path
@@ -45,6 +45,11 @@ _PARTICIPANT_COLUMNS = (
     Column('sessions', INTEGER, '1', 'how often the simulator was started for the participant'),
     Column('trials', INTEGER, '1', 'trials that count'),
     Column('trials_planned', INTEGER, '1', 'trials of the session'),
+    Column('consent_version', TEXT, '', 'of the consent that was given last',
+           empty='the study names none, or nothing was agreed to'),
+    Column('consent_sha256', TEXT, '', 'of its file, as in provenance.json',
+           empty='nothing was agreed to'),
+    Column('consent_language', TEXT, '', 'in which it was read', empty='nothing was agreed to'),
     flag_column('complete', 'whether everything of the session is finished or left out'),
     Column('end_reason', TEXT, '', 'why the session was ended early', empty='it was not'))
 
@@ -84,7 +89,7 @@ class ParticipantsTable:
                'begun': utc(record.begun_at), 'begun_s': record.begun_at,
                'ended': utc(record.ended_at), 'ended_s': record.ended_at, 'sessions': len(runs),
                'trials': len(record.counted), 'trials_planned': trials_planned,
-               'complete': record.complete,
+               'complete': record.complete, **_consent(record),
                'end_reason': next((entry.get('reason') for entry in record.entries
                                    if entry['entry'] == SessionEvent.ENDED), None)}
         for answered in record.answered:
@@ -95,6 +100,14 @@ class ParticipantsTable:
             elif answered.item.trial is None and scale is not None:
                 row |= scale.values(answered.answers)
         return row
+
+
+def _consent(record: ParticipantRecord) -> dict[str, object]:
+    """Return the consent that was given last."""
+    given: Mapping[str, object] = next((entry['consent'] for entry in reversed(record.entries)
+                  if entry['entry'] == SessionEvent.FINISHED and entry.get('consent')), {})
+    return {f'consent_{key}': given.get(key) if isinstance(given.get(key), str) else None
+            for key in ('version', 'sha256', 'language')}
 
 
 ANSWERS = TableDeclaration('answers', 'a question that was put', (

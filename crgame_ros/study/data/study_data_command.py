@@ -13,7 +13,7 @@ from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.study_data_folder import only_writer, write_study_data
 
 if TYPE_CHECKING:  # A slow import that other commands do not need.
-    pass
+    from crgame_ros.study.file import StudyFile
 
 
 def add_data_arguments(what: Any) -> None:
@@ -136,11 +136,20 @@ def withdraw_command(values: argparse.Namespace) -> int:
     return 0
 
 
+def told_overdue(study: 'StudyFile', folder: Path) -> list[str]:
+    """Return a line about each participant whose data are kept beyond the study's retention."""
+    from crgame_ros.study.folder import StudyFolder
+    return [f'{name}: to be kept until {day}: crgame study withdraw {folder} --participant {name}'
+            for name, day in StudyFolder(folder).overdue(study, datetime.now(UTC).date())]
+
+
 def _read(folder: Any, reports: bool = False) -> 'StudyData':
     from crgame_ros.recording.progress import Progress
     from crgame_ros.study.data.study_data import read_study_data
     from crgame_ros.study.folder import StudyFolder
     StudyFolder(folder.path).check_withdrawals()
+    for line in told_overdue(folder.study, folder.path):
+        _print(f'note: {line}')
     data = read_study_data(folder, _print, Progress(_print).tell, reports)
     for problem in data.problems:
         _print(f'note: {problem}')

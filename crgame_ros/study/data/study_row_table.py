@@ -65,7 +65,8 @@ def question_column(question: Question, name: str, language: str) -> Column:
         return Column(name, NUMBER, '1', says, variant=f'{kind.low:g} to {kind.high:g}',
                       empty=_ASKED)
     if isinstance(kind, NumberQuestion):
-        return Column(name, INTEGER if kind.whole else NUMBER, kind.unit, says, empty=_ASKED)
+        return Column(name, INTEGER if kind.whole else NUMBER, kind.unit.in_language(language),
+                      says, empty=_ASKED)
     several = getattr(kind, 'several', False)
     return Column(name, TEXT, '', says, empty=_ASKED,
                   variant='names of the choices, as a JSON array' if several else '')

@@ -10,6 +10,7 @@ from typing import Protocol
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.study.drive_state import DrivePhase, DriveState
 from crgame_ros.study.file import Break, Page
+from crgame_ros.study.pages import consent_of
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_journal import SessionEvent
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
@@ -140,8 +141,9 @@ class Desk:
         if self.break_left_s > 0.5:
             raise InputError('is not over', 'the break', 'wait until it is')
         if isinstance(now.what, Page) and now.what.consent:
+            told['consent'] = consent_of(self.session.study, now.what, self.language)
             if agreed is False:
-                self.session.end(DECLINED)
+                self.session.end(DECLINED, consent=told['consent'])
                 self._moved()
                 return
             told['agreed'] = agreed

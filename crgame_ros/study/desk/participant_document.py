@@ -144,7 +144,7 @@ def _question(question: Question, language: str) -> dict[str, object]:
             [name, text.in_language(language)] for name, text in kind.texts.items()]}
     if isinstance(kind, NumberQuestion):
         return document | {'kind': 'number', 'low': kind.low, 'high': kind.high,
-                           'whole': kind.whole, 'unit': kind.unit}
+                           'whole': kind.whole, 'unit': kind.unit.in_language(language)}
     assert isinstance(kind, TextQuestion)
     return document | {'kind': 'text', 'longest': kind.longest}
 

@@ -30,10 +30,12 @@ from crgame_ros.cockpit.request_guard import (
 from crgame_ros.cockpit.server import listen
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.paths import page_directory
+from crgame_ros.study.desk.consent_copy import consent_copy
 from crgame_ros.study.desk.desk import Desk
 from crgame_ros.study.desk.messages import MAX_BYTES, parse_experimenter, parse_participant
 from crgame_ros.study.desk.page_markdown import picture
-from crgame_ros.study.desk.pages import DeskPages, TOLD_EVERY_S
+from crgame_ros.study.desk.pages import DeskPages, TOLD_EVERY_S, words_of
+from crgame_ros.study.file import Page
 
 MESSAGES_PER_S, MESSAGE_BURST = 20.0, 60.0
 MAX_MALFORMED = 5
@@ -236,6 +238,16 @@ def _add_pages(app: web.Application, desk: Desk, access: Access,
         return web.Response(text=lines, content_type='application/jsonl', headers={
             hdrs.CONTENT_DISPOSITION: f'attachment; filename="{name}"'})
 
+    async def copy(_: web.Request) -> web.Response:
+        item, language = desk.session.next_item, desk.language
+        if item is None or not isinstance(item.what, Page) or not item.what.consent:
+            return web.Response(status=404, text='No consent is asked for now.\n')
+        study = desk.session.study
+        made = consent_copy(study, item.what, language, desk.session.participant, desk.clock_s(),
+                            words_of(study, language))
+        return web.Response(text=made.html, content_type='text/html', headers={
+            hdrs.CONTENT_DISPOSITION: f'attachment; filename="{made.name}"'})
+
     async def static(request: web.Request) -> web.Response:
         return file_answer(request, table.get(request.path))
 
@@ -245,6 +257,7 @@ def _add_pages(app: web.Application, desk: Desk, access: Access,
     app.router.add_get('/', participant)
     app.router.add_get('/experimenter', experimenter)
     app.router.add_get('/experimenter/journal', journal)
+    app.router.add_get('/consent', copy)
     app.router.add_get('/picture/{name:.*}', shown)
     app.router.add_get('/static/{name:.*}', static)
 

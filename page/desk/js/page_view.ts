@@ -35,6 +35,8 @@ export function pageView({ tree, consent }: PageDocument, words: Words,
   finish: (agreed?: boolean) => void): HTMLElement {
   const article = element('article', { class: 'reading' }, ...pageNodes(tree));
   const buttons = element('div', { class: 'go-on' });
+  const copy = element('p', {}, element('a', { class: 'copy', href: '/consent', download: '',
+    text: words.of('copy') }));
   if (!consent) {
     buttons.append(button(words.of('next'), 'primary', () => finish()));
     return element('div', {}, article, buttons);
@@ -50,7 +52,7 @@ export function pageView({ tree, consent }: PageDocument, words: Words,
     button(words.of('disagree'), '', ask),
     button(words.of('agree'), 'primary', () => finish(true)));
   show();
-  return element('div', {}, article, buttons);
+  return element('div', {}, article, copy, buttons);
 }
 
 export function button(text: string, kind: string, act: () => void) {
