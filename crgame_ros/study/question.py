@@ -38,6 +38,11 @@ class LikertQuestion:
     right: Text = LocalText()
     labels: Annotated[tuple[Text, ...], Listed(0, 11, 'label')] = ()
 
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Return the least and the greatest answer."""
+        return 1.0, float(self.points)
+
     def check(self) -> None:
         """Refuse labels of unknown points."""
         if self.labels and len(self.labels) != self.points:
@@ -70,6 +75,11 @@ class SliderQuestion:
     step: Annotated[float, Within(0.0, above=True)] = 1.0
     left: Text = LocalText()
     right: Text = LocalText()
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Return the least and the greatest answer."""
+        return self.low, self.high
 
     def check(self) -> None:
         """Refuse a line of zero length."""
@@ -137,6 +147,12 @@ class NumberQuestion:
     whole: bool = False
     unit: Text = LocalText()
 
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Return the least and the greatest answer; infinite where there is no limit."""
+        return (self.low if self.low > -_UNLIMITED else -math.inf,
+                self.high if self.high < _UNLIMITED else math.inf)
+
     def refusal(self, answer: Any) -> str:
         """Return why an answer is invalid, empty if it is valid."""
         fits = _finite(answer) and self.low <= answer <= self.high \
@@ -190,6 +206,11 @@ class Question:
     kind: Annotated[QuestionKind, Keyed(KINDS, 'kind of answer')]
     ask: Annotated[Text, Advice('say what is asked')] = LocalText()
     required: bool = True
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Return the least and the greatest number; infinite where there is no limit."""
+        return getattr(self.kind, 'bounds', (-math.inf, math.inf))
 
     @property
     def texts(self) -> tuple[LocalText, ...]:

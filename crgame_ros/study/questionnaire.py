@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Questionnaires: groups of questions, and the scores of their answers."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 import math
@@ -47,12 +47,33 @@ class Score:
     offset: float = 0.0
     pairs: Annotated[tuple[str, ...], Listed(noun='question')] = ()
 
+    def bounds(self, questions: Sequence[Question]) -> tuple[float, float]:
+        """
+        Return the least and the greatest score; infinite where an answer has no limit.
+
+        :param questions: all of the questionnaire.
+        """
+        asked = {question.name: question.bounds for question in questions}
+        ends = [sorted(self._signed(item, end) for end in asked[item]) for item in self.items]
+        lows, highs = zip(*ends, strict=True)
+        if self.how == 'tally':
+            # All weight may be on one item.
+            found = min(lows), max(highs)
+        else:
+            count = 1 if self.how == 'sum' else len(self.items)
+            found = sum(lows) / count, sum(highs) / count
+        low, high = sorted(self.factor * end for end in found)
+        return low, high
+
+    def _signed(self, item: str, value: float) -> float:
+        return (-1.0 if item in self.flipped else 1.0) * (value + self.offset)
+
     def compute(self, answers: Mapping[str, Answer]) -> float:
         """Compute the score; NaN if an answer is missing."""
         values = [answers.get(item) for item in self.items]
         if not all(isinstance(value, int | float) for value in values):
             return math.nan
-        signed = [(-1.0 if item in self.flipped else 1.0) * (float(value) + self.offset)
+        signed = [self._signed(item, float(value))
                   for item, value in zip(self.items, values, strict=True)
                   if isinstance(value, int | float)]
         if self.how == 'sum':

@@ -3,6 +3,7 @@
 """Means of conditions: their intervals against scipy's tests and hand-computed numbers."""
 
 import math
+import re
 
 from crgame_ros.study.data.condition_section import (
     condition_means,
@@ -82,6 +83,19 @@ def test_with_few_values_there_is_no_interval() -> None:
     assert math.isnan(alone.conditions[1].mean)
     picture = condition_svg(alone.conditions, 'speed', 2)
     assert 'NaN' not in picture and 'nan' not in picture
+
+
+def test_no_interval_is_drawn_beyond_its_scale() -> None:
+    """Two people on a scale from 1 to 7 have Student's interval of 12.7 times the error."""
+    means = condition_means({('P1', 'a'): 4.0, ('P2', 'a'): 6.0}, ('a',)).conditions
+    assert means[0].mean + means[0].half == pytest.approx(5.0 + 12.706, abs=1e-3)
+
+    def labels(picture: str) -> set[str]:
+        return set(re.findall(r'<text class="tick"[^>]*>([^<]*)<', picture))
+
+    drawn = labels(condition_svg(means, 'score', 2, (1.0, 7.0)))
+    assert {float(text.replace('−', '-')) for text in drawn} <= set(range(9))
+    assert '20' in labels(condition_svg(means, 'score', 2))
 
 
 def test_repetitions_are_taken_together_first() -> None:

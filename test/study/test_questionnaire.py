@@ -3,9 +3,11 @@
 """Scores against examples computed by hand, and the scales' published bounds."""
 
 import math
+import random
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
+from crgame_ros.study.question import Answer, ChoiceQuestion, Question
 from crgame_ros.study.questionnaire import (
     load_questionnaire,
     Questionnaire,
@@ -105,3 +107,29 @@ def test_what_is_no_questionnaire_is_told(values: dict[str, object], message: st
 def test_an_unknown_one_is_told() -> None:
     with pytest.raises(InputError, match='nasa_tlx, nasa_tlx_raw, ssq, van_der_laan'):
         load_questionnaire('tlx')
+
+
+@pytest.mark.parametrize('name', standard_questionnaires())
+def test_the_bounds_of_scores_are_reached(name: str) -> None:
+    """Of random answers and the extreme ones, no score is beyond, and both ends are met."""
+    scale = load_questionnaire(name)
+    rng = random.Random(1)
+
+    def answer(question: Question, item_end: float | None) -> Answer:
+        if isinstance(question.kind, ChoiceQuestion):
+            return rng.choice(list(map(str, question.kind.choices)))
+        low, high = question.bounds
+        return rng.choice((low, high)) if item_end is None else (low, high)[int(item_end)]
+
+    for score in scale.scores:
+        low, high = score.bounds(scale.questions)
+        worst = {question.name: answer(question, float(question.name in score.flipped))
+                 for question in scale.questions}
+        best = {question.name: answer(question, float(question.name not in score.flipped))
+                for question in scale.questions}
+        assert score.compute(worst) == pytest.approx(low)
+        assert score.compute(best) == pytest.approx(high)
+        for _ in range(200):
+            value = score.compute({question.name: answer(question, None)
+                                   for question in scale.questions})
+            assert low - 1e-9 <= value <= high + 1e-9

@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report section on conditions: means with intervals, and a plot of each measure."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from typing import Any, NamedTuple
 
 from crgame_ros.analysis.report.svg_axis import axis_ticks, tick_text
 from crgame_ros.analysis.report.text import free, note, number, plain, table
-from crgame_ros.analysis.tables.column import Column, FLAG, NUMBER
+from crgame_ros.analysis.tables.column import Column, NUMBER
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.trials_table import measure_columns, TASK_COLUMNS
 from crgame_ros.study.trial_plan import conditions_of
@@ -25,6 +25,7 @@ _LINE, _CHARACTER = 17, 8.3
 # Points of equal height are drawn side by side up to this distance from the middle [px].
 _SPREAD, _NEAR = 26.0, 7.0
 _LONGEST_NAME = 60
+_UNBOUND = (-math.inf, math.inf)
 # The driving measures that are shown, by their names in the table of vehicles; the others are
 # only in the tables.
 SHOWN = ('mean_speed', 'max_speed', 'min_acceleration', 'max_inverse_ttc',
@@ -145,15 +146,17 @@ def _t(freedom: int) -> float:
     return float(t.ppf(0.5 + LEVEL / 2.0, freedom))
 
 
-def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int) -> str:
+def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int,
+                  bounds: tuple[float, float] = _UNBOUND) -> str:
     """
     Draw the conditions side by side, as SVG.
 
     :param words: alternative text of the plot.
     :param digits: decimal places of the means.
+    :param bounds: of the scale; nothing is drawn beyond it.
     """
     ticks = axis_ticks([value for each in conditions for value in (
-        *each.points.values(), each.mean - each.half, each.mean + each.half, each.mean)], 5)
+        *each.points.values(), *_drawn_interval(each, bounds), each.mean)], 5)
     low, high = ticks[0], ticks[-1]
 
     def y(value: float) -> float:
@@ -174,7 +177,7 @@ def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int) 
                      f'<title>{plain(each.condition)}</title>{spans}</text>')
         marks += _points(each, middle, wide, y)
         if not math.isnan(each.mean):
-            marks.append(_mean_mark(each, middle + min(0.32 * wide, 40.0), y))
+            marks.append(_mean_mark(each, middle + min(0.32 * wide, 40.0), y, bounds))
     told = '; '.join(f'{each.condition}: mean {number(each.mean, digits)}' + (
         '' if math.isnan(each.half) else f' ± {number(each.half, digits)}')
         for each in conditions)
@@ -200,12 +203,19 @@ def _points(each: ConditionMean, middle: float, wide: float,
     return marks
 
 
-def _mean_mark(each: ConditionMean, x: float, y: Callable[[float], float]) -> str:
+def _drawn_interval(each: ConditionMean, bounds: tuple[float, float]) -> tuple[float, float]:
+    """Return the ends of an interval, which knows no bounds of its scale, within them."""
+    if math.isnan(each.half):
+        return math.nan, math.nan
+    return max(bounds[0], each.mean - each.half), min(bounds[1], each.mean + each.half)
+
+
+def _mean_mark(each: ConditionMean, x: float, y: Callable[[float], float],
+               bounds: tuple[float, float]) -> str:
     height = y(each.mean)
+    low, high = _drawn_interval(each, bounds)
     bar = '' if math.isnan(each.half) else (
-        f'<line class="mean" x1="{x:.1f}" x2="{x:.1f}" '
-        f'y1="{y(each.mean - each.half):.1f}" '
-        f'y2="{y(each.mean + each.half):.1f}"/>')
+        f'<line class="mean" x1="{x:.1f}" x2="{x:.1f}" y1="{y(low):.1f}" y2="{y(high):.1f}"/>')
     return f'{bar}<rect class="mean" x="{x - 5:.1f}" y="{height - 5:.1f}" width="10" height="10"/>'
 
 
@@ -221,18 +231,28 @@ class ShownMeasure(NamedTuple):
     :param group: its heading.
     :param column: its declaration.
     :param means: of the conditions.
+    :param bounds: of the scale, infinite without any.
     """
 
     group: str
     column: Column
     means: ConditionMeans
+    bounds: tuple[float, float] = _UNBOUND
+
+    @property
+    def is_cut(self) -> bool:
+        """Return whether an interval is longer than it is drawn."""
+        return any(each.mean - each.half < self.bounds[0] or each.mean + each.half > self.bounds[1]
+                   for each in self.means.conditions)
 
 
 def shown_measures(data: StudyData, conditions: Sequence[str],
                    blocks: Sequence[str]) -> list[ShownMeasure]:
     """Return the scores and measures with values in these blocks, with their means."""
     measures = measure_columns()
-    columns = [(_SCORES, column) for column in _scored(data)]
+    scored = list(_scored(data))
+    bounds = {column.name: ends for column, ends in scored}
+    columns = [(_SCORES, column) for column, _ in scored]
     columns += [(_DRIVING, measures[name]) for name in SHOWN if name in measures]
     columns += [(_TASKS, column) for column in TASK_COLUMNS if column.type == NUMBER]
     found = []
@@ -240,7 +260,8 @@ def shown_measures(data: StudyData, conditions: Sequence[str],
     for group, column in columns:
         values = participant_means(rows, column.name)
         if values:
-            found.append(ShownMeasure(group, column, condition_means(values, conditions)))
+            found.append(ShownMeasure(group, column, condition_means(values, conditions),
+                                      bounds.get(column.name, _UNBOUND)))
     return found
 
 
@@ -285,6 +306,8 @@ def _block(data: StudyData, conditions: tuple[str, ...], blocks: Sequence[str],
     if not shown:
         return html + note('There are no values yet.')
     html += interval_note([each.means for each in shown])
+    if any(each.is_cut for each in shown):
+        html += note('An interval that goes beyond the ends of its scale is drawn up to them.')
     for group in dict.fromkeys(each.group for each in shown):
         of_group = [each for each in shown if each.group == group]
         html += table(f'{group}: means with 95 % intervals', (
@@ -311,7 +334,7 @@ def _figure(shown: ShownMeasure) -> str:
     words = shown.column.name
     told = f' <span class="unit">[{plain(unit)}]</span>' if unit else ''
     return (f'<figure class="chart"><figcaption>{plain(words)}{told}</figcaption>'
-            f'{condition_svg(shown.means.conditions, words, 2)}</figure>')
+            f'{condition_svg(shown.means.conditions, words, 2, shown.bounds)}</figure>')
 
 
 def _differs(means: ConditionMeans) -> bool:
@@ -327,14 +350,14 @@ def _digits(value: float) -> int:
     return 3 if abs(value) < 1.0 else 2 if abs(value) < 100.0 else 1
 
 
-def _scored(data: StudyData) -> list[Column]:
-    """Return the columns of scores; without scores, of the numeric answers."""
-    columns: list[Column] = []
+def _scored(data: StudyData) -> Iterator[tuple[Column, tuple[float, float]]]:
+    """Yield the columns of scores with their bounds; without scores, of the numeric answers."""
     language = data.folder.study.language
     for asked in data.asked.after_trials.values():
-        declared = asked.columns(language)
-        count = len(asked.scale.questions)
-        chosen: list[Any] = declared[count:] or [
-            column for column in declared if column.kind in ('number', 'integer')]
-        columns += [column for column in chosen if column.type != FLAG]
-    return columns
+        declared, scale = asked.columns(language), asked.scale
+        count = len(scale.questions)
+        bounds = [*(question.bounds for question in scale.questions),
+                  *(score.bounds(scale.questions) for score in scale.scores)]
+        chosen = list(zip(declared, bounds, strict=True))
+        yield from chosen[count:] or [
+            (column, ends) for column, ends in chosen if column.kind in ('number', 'integer')]
