@@ -179,6 +179,23 @@ def test_only_own_alarms_frame_the_screen_until_acknowledged(
     server.publish('alarms', {'active': []})
 
 
+def test_the_title_stays_readable_beside_alarms(server: Served, page: Browser) -> None:
+    """A title of the usual length is there as a whole, on one line or two."""
+    usual = page.run('const n = document.querySelector("#title"), { textContent } = n;'
+                     'n.textContent = "Two people in one lane"; return textContent;')
+    server.publish('alarms', {'active': [
+        alarm(kind, seat) for seat in ('hv0', 'av0') for kind in ('collision', 'off_road')]})
+    page.wait('document.querySelectorAll("#alarms .alarm").length >= 2')
+    for width in (1920, 1280, 1000):
+        page.resize(width, 720)
+        page.wait_for_frame()
+        assert page.run('const n = document.querySelector("#title");'
+                        'return n.scrollHeight <= n.clientHeight + 1'), width
+        assert page.run('return document.querySelector("#bar").scrollWidth') <= width
+    page.run('document.querySelector("#title").textContent = arguments[0]', usual)
+    server.publish('alarms', {'active': []})
+
+
 def test_what_is_around_is_said_in_words(page: Browser, run: RecordedRun) -> None:
     page.wait('document.querySelector("#around").textContent.startsWith("You drive hv0")')
     text = page.run('return crgame.around.describe()')

@@ -184,6 +184,29 @@ async def test_a_break_lasts_whatever_the_page_says(tmp_path: Path) -> None:
 
 
 @in_loop
+async def test_a_page_that_says_nothing_is_silent_and_its_delays_are_unknown(
+        tmp_path: Path) -> None:
+    """The desk's clock is set on: the same as a page that has frozen for a minute."""
+    async with served(tmp_path) as running:
+        socket, director = await running.join(), await running.direct()
+        ping = {'type': 'ping', 't': 1.0, 'round_trip_ms': 12.5, 'seated': True}
+        await socket.send_json(ping)
+        await shown(director, lambda content: content['type'] == 'desk'
+                    and content['page'].get('round_trip_ms') == 12.5)
+        usual_s = running.desk.clock_s
+        running.desk.clock_s = lambda: usual_s() + 60.0
+        page = (await shown(director, lambda content: content['type'] == 'desk'
+                            and 'silent_s' in content['page']))['page']
+        assert page.keys() == {'connected', 'open', 'silent_s'} and page['silent_s'] >= 60
+        await socket.send_json(ping)
+        page = (await shown(director, lambda content: content['type'] == 'desk'
+                            and 'silent_s' not in content['page']))['page']
+        assert page['round_trip_ms'] == 12.5 and page['seated'] is True
+        await socket.close()
+        await director.close()
+
+
+@in_loop
 async def test_only_the_printed_link_makes_an_experimenter(tmp_path: Path) -> None:
     async with served(tmp_path) as running:
         for path in ('/experimenter', '/experimenter/journal', '/ws/experimenter',

@@ -64,6 +64,8 @@ def _read(file: Path) -> dict[str, str]:
     return given
 
 
+# A page says every second that it is there; one that is frozen or hidden says nothing [s].
+SILENT_S = 5.0
 # The run's clock changes with every cycle; faster updates are not readable.
 TOLD_EVERY_S = 0.2
 
@@ -88,6 +90,8 @@ class DeskPages:
         self._used: Client | None = None
         self._used_page = ''
         self._told: dict[str, object] = {}
+        # When the used page was heard last [s since 1970].
+        self._heard_s = 0.0
         self._is_due = False
         desk.watch(self._changed)
 
@@ -116,9 +120,22 @@ class DeskPages:
 
     @property
     def page(self) -> dict[str, object]:
-        """Return the state of the participant's page: connected, delays [ms], seat."""
-        return {'connected': self._used is not None, 'open': len(self._participants),
-                **self._told}
+        """
+        Return the state of the participant's page: connected, delays [ms], seat.
+
+        Of a silent page nothing is known but `silent_s`, the time since it was heard.
+        """
+        state: dict[str, object] = {'connected': self._used is not None,
+                                    'open': len(self._participants)}
+        if not self._is_silent:
+            return {**state, **self._told}
+        told = {'silent_s': round(self.desk.clock_s() - self._heard_s)}
+        return {**state, **told, **{name: value for name, value in self._told.items()
+                                    if name == 'error'}}
+
+    @property
+    def _is_silent(self) -> bool:
+        return self._used is not None and self.desk.clock_s() - self._heard_s > SILENT_S
 
     def update_experimenters(self) -> None:
         """Send the present document to the experimenter's pages."""
@@ -131,7 +148,7 @@ class DeskPages:
     @property
     def is_due(self) -> bool:
         """Return whether the experimenter's pages lack a change."""
-        return self._is_due
+        return self._is_due or self._is_silent
 
     def participant_says(self, client: Client, message: ParticipantMessage) -> None:
         """
@@ -146,10 +163,13 @@ class DeskPages:
             if isinstance(message, Here) or message.fresh or page == self._used_page \
                     or not self._used:
                 self._used, self._used_page, self._told = client, page, {}
+                self._heard_s = self.desk.clock_s()
             self._changed()
             return
         if isinstance(message, Ping):
             if client is self._used:
+                self._is_due = self._is_due or self._is_silent
+                self._heard_s = self.desk.clock_s()
                 self._hear(message.model_dump(exclude={'type', 't'}, exclude_none=True))
             self._answer(client, message)
             return

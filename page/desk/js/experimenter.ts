@@ -143,9 +143,11 @@ class ExperimenterPage {
     const drive = page.drive_delay_ms === undefined ? ''
       : `, input latency ${Math.round(page.drive_delay_ms)} ms`;
     const more = page.open > 1 ? `, ${page.open} tabs` : '';
-    setText(node, page.connected ? `Participant's page: connected${delay}${drive}${more}`
+    const silent = page.silent_s === undefined ? ''
+      : `, but silent for ${page.silent_s} s: it is frozen, or hidden`;
+    setText(node, page.connected ? `Participant's page: connected${silent}${delay}${drive}${more}`
       : "Participant's page: not connected");
-    node.dataset.connected = String(page.connected);
+    node.dataset.connected = String(page.connected && page.silent_s === undefined);
   }
 
   #showNow(shown: ExperimenterDocument) {

@@ -18,6 +18,7 @@ export interface ParticipantPage {
   round_trip_ms?: number;
   drive_delay_ms?: number;
   seated?: boolean;
+  silent_s?: number; // since the page was heard, if that is long ago; nothing else is known then
   error?: string;
 }
 
