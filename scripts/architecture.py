@@ -34,10 +34,10 @@ FOLDERS = (
     'instruments', 'simulation', 'recording', 'worlds', 'analysis/criticality',
     'analysis/behaviour', 'analysis/rules', 'analysis/blame', 'analysis/scores',
     'analysis/pictures', 'analysis/runs', 'analysis/tables', 'analysis/report', 'analysis',
-    'evaluation/results', 'evaluation/summary', 'evaluation', 'study', 'study/data', 'cockpit',
-    'cockpit/runs', 'study/desk', 'gym', 'ros', 'nodes/sim', 'nodes/cockpit', 'nodes/markers',
-    'nodes', 'launcher', 'submission', 'verdict', 'search', 'study/conduct', 'reproduction',
-    'python_interface', HIGHEST)
+    'evaluation/results', 'evaluation/summary', 'evaluation', 'study', 'study/analysis',
+    'study/data', 'cockpit', 'cockpit/runs', 'study/desk', 'gym', 'ros', 'nodes/sim',
+    'nodes/cockpit', 'nodes/markers', 'nodes', 'launcher', 'submission', 'verdict', 'search',
+    'study/conduct', 'reproduction', 'python_interface', HIGHEST)
 BEGIN, END = '<!-- folders: begin -->', '<!-- folders: end -->'
 # Of the picture [px].
 CELL, NAMES, TOP = 22, 150, 120

@@ -48,7 +48,8 @@ THIRD_PARTY = {
 # Packages of extras, chosen by the user; no other part of the package imports them.
 EXTRAS = {'evaluate': {'cryptography', 'dask', 'distributed'}, 'gym': {'gymnasium', 'pettingzoo'},
           'instruments': {'pylsl', 'serial'}, 'minari': {'minari'},
-          'openscenario': {'scenariogeneration'}, 'search': {'cmaes', 'optuna', 'sklearn'}}
+          'openscenario': {'scenariogeneration'}, 'search': {'cmaes', 'optuna', 'sklearn'},
+          'statistics': {'statsmodels'}}
 PIP_NAMES = {'serial': 'pyserial', 'sklearn': 'scikit-learn'}
 # Of requirements-planners.txt, by imported name.
 OF_PLANNERS = {'commonroad_idm_planner': 'commonroad-idm-planner',

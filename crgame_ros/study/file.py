@@ -12,6 +12,7 @@ from crgame_ros.schema.marks import Folder, Keyed, Listed, Within, Wording
 from crgame_ros.schema.reading import read
 from crgame_ros.study.local_text import LocalText, Text
 from crgame_ros.study.names import Name
+from crgame_ros.study.planned_analysis import PlannedAnalysis
 from crgame_ros.study.quality import QualityBounds
 from crgame_ros.study.question import Question
 from crgame_ros.study.retention import Retention
@@ -177,6 +178,7 @@ class StudyFile:
     :param markers: that the experimenter can set by a key during a session.
     :param retention: until when the participants' data may be kept.
     :param quality: the bounds of data that hold, and what happens beyond them.
+    :param analysis: the planned comparisons.
     :param settings: of all trials.
     :param factors: the factors of the experiment.
     :param before: steps before the first block.
@@ -198,6 +200,7 @@ class StudyFile:
     markers: Annotated[tuple[str, ...], Listed(0, 9, 'marker')] = ('marker',)
     retention: Retention | None = None
     quality: QualityBounds = QualityBounds()
+    analysis: PlannedAnalysis = PlannedAnalysis()
     settings: TrialSettings = NOTHING
     factors: Annotated[tuple[Factor, ...], Listed(0, 10, 'factor', 'name')] = ()
     before: Steps = ()
@@ -205,7 +208,7 @@ class StudyFile:
     base: Annotated[Path, Folder()] = Path('.')
 
     def check(self) -> None:
-        """Refuse blocks that name unknown factors or conditions."""
+        """Refuse blocks that name unknown factors or conditions, and comparisons that do."""
         known = {factor.name for factor in self.factors}
         for block in self.blocks:
             for name in block.factors or ():
@@ -213,6 +216,7 @@ class StudyFile:
                     raise InputError(f'names the factor "{name}", which is not there',
                                      f'blocks: {block.name}',
                                      f'name {", ".join(sorted(known)) or "none"}')
+        self.analysis.check_factors(self.factors)
 
     @property
     def all_languages(self) -> tuple[str, ...]:

@@ -37,6 +37,10 @@ blocks:
   - name: main
     after_trial: [{{questions: van_der_laan}}, {{questions: remarks.yaml}}]
 after: [{{questions: ssq}}]
+analysis:
+  comparisons:
+  - {{measure: mean_speed_m_per_s, factor: planner, contrast: [idm, cv]}}
+  - {{measure: acceptance_usefulness, factor: planner}}
 """
 REMARKS = """
 name: remarks

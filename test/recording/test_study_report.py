@@ -13,6 +13,7 @@ from crgame_ros.study.session_journal import JOURNAL, SessionJournal
 import numpy as np
 import polars
 import pytest
+from scipy import stats
 from study_maker import Studied
 
 pytestmark = pytest.mark.xdist_group('study-data')
@@ -46,6 +47,28 @@ def test_means_and_intervals_are_those_of_the_tables(studied: Studied) -> None:
     # A point for each participant in each of two conditions.
     assert len(re.findall(r'<title>P0[123]: ', html.partition('mean_speed_m_per_s <')[2]
                           .partition('</figure>')[0])) == 6
+
+
+def test_planned_comparisons_are_those_of_the_table_and_of_the_script(studied: Studied) -> None:
+    html = report_of(studied.folder)
+    assert main(['study', 'data', str(studied.folder), '--no-reports']) == 0
+    trials = polars.read_parquet(studied.folder / 'data' / 'trials.parquet')
+    first, second = (np.array([trials.filter(participant=name, condition=condition)[
+        'mean_speed_m_per_s'].mean() for name in ('P01', 'P02', 'P03')])
+        for condition in ('idm', 'cv'))
+    test = stats.ttest_rel(second, first)
+    row = rows_of(html, 'Differences within participants')[0]
+    assert row[0] == 'mean_speed_m_per_splanner: cv − idm' and row[1:3] == ['m/s', '3']
+    assert row[8] == f'{test.pvalue:.3f}'
+    # Of the two tests of the plan.
+    assert len(rows_of(html, 'Effect sizes')) == 2
+    script = (studied.folder / 'data' / 'analysis.R').read_text()
+    assert 'compare("mean_speed_m_per_s", "planner", "idm", "cv", "two.sided")' in script
+    assert 'method = "holm", n = 2' in script
+    assert '`mean_speed_m_per_s` ~ `planner` + (1 | participant)' in script
+    for left, right in ('()', '[]', '{}'):
+        assert script.count(left) == script.count(right)
+    assert 'statsmodels' in html
 
 
 def test_it_has_participants_and_problems(studied: Studied) -> None:

@@ -251,6 +251,11 @@ class StudyData:
                 EVENTS_OF_SESSIONS)
 
     @property
+    def factor_columns(self) -> dict[str, str]:
+        """Return the columns of the factors in the table of trials, by the factors' names."""
+        return {name: column.name for name, column in self.trials_table.factors.items()}
+
+    @property
     def problems(self) -> list[str]:
         """Return the trials without measures, with the reasons."""
         return [f'{each.record.id}, trial {each.attempt.trial.number}: {each.row["problem"]}'

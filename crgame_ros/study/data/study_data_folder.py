@@ -20,6 +20,7 @@ from crgame_ros.analysis.tables.run_tables import TABLES
 from crgame_ros.analysis.tables.writer import Format, NOT_A_NUMBER, TableWriter
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import prepare_folder
+from crgame_ros.study.analysis.r_script import r_script
 from crgame_ros.study.data.paper_section import provenance_of
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
 from crgame_ros.study.data.study_row_table import csv_of_table, parquet_of_table
@@ -111,7 +112,7 @@ if TYPE_CHECKING:  # A slow import that other commands do not need.
     pass
 
 
-RUNS, PROVENANCE, LOCK = 'runs', 'provenance.json', '.lock'
+RUNS, PROVENANCE, LOCK, R_SCRIPT = 'runs', 'provenance.json', '.lock', 'analysis.R'
 DESCRIPTION = (
     'What a study of crgame_ros has found. SI units and radians. A value that is missing is null '
     f'in Parquet; in CSV a missing number is {NOT_A_NUMBER}, any other missing value an empty '
@@ -143,7 +144,7 @@ def only_writer(folder: Path) -> Iterator[None]:
 
 def write_study_data(data: StudyData) -> dict[str, int]:
     """
-    Write the study's tables, the tables of all runs, the dictionaries and the provenance.
+    Write the tables of the study and of all runs, dictionaries, provenance, and the R script.
 
     Files are replaced as a whole, the dictionaries last. Equal data give equal bytes.
 
@@ -160,6 +161,8 @@ def write_study_data(data: StudyData) -> dict[str, int]:
             write_bytes(content, path)
             written[file_format].append(  # type: ignore[index]
                 WrittenTable(declaration, path, path.name, len(table)))
+    if data.folder.study.analysis.comparisons:
+        write_text(r_script(data.folder.study, data.factor_columns), out / R_SCRIPT)
     write_text(_json(provenance_of(data)), out / PROVENANCE)
     write_text(_json(_package(written, data.folder.study.name)), out / PACKAGE_FILE)
     rows = {name: len(table) for name, table in data.tables.items()}

@@ -11,6 +11,7 @@ from crgame_ros.analysis.report.section import Section
 from crgame_ros.analysis.report.text import free, marked, note, NOTHING, number, plain, table
 from crgame_ros.study.data.condition_section import condition_section
 from crgame_ros.study.data.paper_section import paper_section
+from crgame_ros.study.data.planned_section import planned_section
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
 from crgame_ros.whole_file import write_text
 
@@ -43,6 +44,8 @@ def study_html(data: StudyData) -> str:
     title = study.title.in_language(study.language) or study.name
     sections = [
         Section('conditions', 'Conditions', condition_section(data)),
+        *([Section('planned', 'Planned comparisons', planned_section(data))]
+          if study.analysis.comparisons else ()),
         Section('people', 'Who took part', _people(data)),
         Section('troubles', 'Left out, aborted, repeated', _troubles(data)),
         Section('timing', 'Timing of each trial', _timing(data)),

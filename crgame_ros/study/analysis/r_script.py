@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Writes the planned analysis as an R script that reads trials.csv beside it."""
+
+from collections.abc import Iterator, Mapping
+
+from crgame_ros.study.analysis.mixed_model import model_formulas, ModelFormula
+from crgame_ros.study.analysis.planned_tests import FLAGS
+from crgame_ros.study.file import StudyFile
+from crgame_ros.study.planned_analysis import Comparison
+
+_HEAD = """\
+# The planned analysis of the study {name}, as crgame_ros does it. Run it in this folder:
+#
+#   Rscript analysis.R
+#
+# Needs the packages lme4 and lmerTest for the mixed models.
+trials <- read.csv("trials.csv", na.strings = c("", "NaN"), check.names = FALSE)
+alpha <- {alpha!r}
+{flagged}
+# Paired test of one measure: each participant's means of two levels, second less first.
+compare <- function(measure, factor, first, second, alternative) {{
+  used <- trials[is.finite(trials[[measure]]) & !is.na(trials[[factor]]), ]
+  means <- tapply(used[[measure]], list(used$participant, used[[factor]]), mean)
+  if (!all(c(first, second) %in% colnames(means))) return(NULL)
+  means <- means[complete.cases(means[, c(first, second)]), c(first, second), drop = FALSE]
+  n <- nrow(means)
+  if (n < 2) return(NULL)
+  difference <- means[, 2] - means[, 1]
+  test <- t.test(difference, alternative = alternative)
+  interval <- t.test(difference, conf.level = 1 - alpha)$conf.int
+  rank <- wilcox.test(difference, alternative = alternative)
+  d_av <- mean(difference) / mean(c(sd(means[, 1]), sd(means[, 2])))
+  data.frame(measure = measure, factor = factor, first = first, second = second, n = n,
+             difference = mean(difference), low = interval[1], high = interval[2],
+             t = unname(test$statistic), p = test$p.value, p_wilcoxon = rank$p.value,
+             d_z = mean(difference) / sd(difference), d_av = d_av,
+             g_av = d_av * (1 - 3 / (4 * (n - 1) - 1)))
+}}
+"""
+
+
+def r_script(study: StudyFile, columns: Mapping[str, str]) -> str:
+    """
+    Return the script.
+
+    Names of columns are in backticks or quotes, so that words of R may be names.
+
+    :param columns: of the factors, by their names.
+    """
+    analysis = study.analysis
+    flagged = '' if analysis.flagged == 'use' else (
+        '# Trials beyond a bound of quality are left out.\n'
+        f'trials <- trials[!({" | ".join(f"trials${flag} %in% TRUE" for flag in FLAGS)}), ]\n')
+    parts = [_HEAD.format(name=study.name, alpha=analysis.alpha, flagged=flagged)]
+    parts += _tests(study, columns)
+    parts += ['\nlibrary(lme4)\nlibrary(lmerTest)\n']
+    parts += [_model(formula, columns) for formula in model_formulas(study)]
+    return ''.join(parts)
+
+
+def _tests(study: StudyFile, columns: Mapping[str, str]) -> Iterator[str]:
+    factors = {factor.name: factor for factor in study.factors}
+    groups = [[_call(comparison, pair, columns)
+               for pair in comparison.pairs(factors[comparison.factor])]
+              for comparison in study.analysis.comparisons]
+    if study.analysis.family == 'analysis':
+        groups = [[call for group in groups for call in group]]
+    for calls in groups:
+        yield '\ntests <- rbind(\n' + ',\n'.join(f'  {call}' for call in calls) + ')\n'
+        # A test without data still counts in its family.
+        yield f'tests$p_holm <- p.adjust(tests$p, method = "holm", n = {len(calls)})\n'
+        yield 'print(tests)\n'
+
+
+def _call(comparison: Comparison, pair: tuple[str, str], columns: Mapping[str, str]) -> str:
+    alternative = comparison.alternative.replace('-', '.')
+    texts = (comparison.measure, columns[comparison.factor], *pair, alternative)
+    return f'compare({", ".join(_text(text) for text in texts)})'
+
+
+def _model(formula: ModelFormula, columns: Mapping[str, str]) -> str:
+    blocks = ', '.join(_text(block) for block in formula.blocks)
+    lines = [f'\nused <- trials[trials$block %in% c({blocks}) & '
+             f'is.finite(trials[[{_text(formula.measure)}]]), ]']
+    for factor in formula.factors:
+        name = _text(columns[factor.name])
+        levels = ', '.join(_text(level.name) for level in factor.levels)
+        lines.append(f'used[[{name}]] <- factor(used[[{name}]], levels = c({levels}))')
+    terms = ' + '.join(f'`{columns[factor.name]}`' for factor in formula.factors)
+    lines += [f'model <- lmer(`{formula.measure}` ~ {terms} + (1 | participant), data = used, '
+              'REML = TRUE)', 'print(summary(model))', 'print(confint(model, method = "Wald"))']
+    return '\n'.join(lines) + '\n'
+
+
+def _text(text: str) -> str:
+    escaped = text.replace('\\', '\\\\').replace('"', '\\"')
+    return f'"{escaped}"'

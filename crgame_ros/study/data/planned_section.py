@@ -1,0 +1,153 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The report section on planned comparisons: tests, effect sizes, and mixed models."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
+from crgame_ros.analysis.tables.column import Column, FLAG, TEXT
+from crgame_ros.errors import InputError
+from crgame_ros.study.analysis.mixed_model import fit_models, missing_extra, MixedModel
+from crgame_ros.study.analysis.planned_tests import planned_tests, PlannedTest, used_rows
+from crgame_ros.study.data.study_data import StudyData
+from crgame_ros.study.file import StudyFile
+
+_WORDS = {'two-sided': '≠ 0', 'greater': '> 0', 'less': '< 0'}
+
+
+def check_measures(study: StudyFile, columns: Sequence[Column]) -> None:
+    """
+    Check that the planned comparisons are of columns with numbers.
+
+    :param columns: of the table of trials.
+    :raises InputError: naming the comparison.
+    """
+    known = {column.name: column for column in columns}
+    for number_, comparison in enumerate(study.analysis.comparisons):
+        where = f'analysis: comparisons[{number_}]: measure'
+        if comparison.measure not in known:
+            parts = set(comparison.measure.split('_'))
+            near = sorted((name for name in known if parts & set(name.split('_'))),
+                          key=lambda name: -len(parts & set(name.split('_'))))[:3]
+            raise InputError(f'names "{comparison.measure}", which is no column of trials.csv',
+                             where, f'name one such as {", ".join(near) or "mean_speed_m_per_s"}')
+        if known[comparison.measure].type in (TEXT, FLAG):
+            raise InputError(f'names "{comparison.measure}", which has no numbers', where,
+                             'name a column with numbers')
+
+
+def planned_section(data: StudyData) -> str:
+    """Return the section; a comparison of no column with numbers is named instead."""
+    study = data.folder.study
+    try:
+        check_measures(study, data.trials_table.declaration.columns)
+    except InputError as error:
+        # The study file must not change once people have taken part.
+        return note(f'<strong>{plain(error)}</strong>')
+    rows = [trial.row for trial in data.trials]
+    tests = planned_tests(study, rows, data.factor_columns)
+    used = used_rows(study, rows)
+    return _method(study, len(rows), len(used)) + _tests(data, tests) + _effects(tests) \
+        + _models(data, used)
+
+
+def method_of(study: StudyFile) -> str:
+    """Return the method of the tests as sentences."""
+    analysis = study.analysis
+    family = 'all tests of this analysis' if analysis.family == 'analysis' \
+        else 'the tests of each comparison'
+    flagged = 'Trials beyond a bound of quality are used.' if analysis.flagged == 'use' \
+        else 'Trials beyond a bound of quality (timing_flag, page_flag) are left out.'
+    return (
+        'A participant’s value in a level is the mean over its trials in the level, in all blocks '
+        'that cross the factor. A participant without a value in one of both levels is not in '
+        'that test; nothing is imputed. The difference is the second level less the first, with '
+        f'its two-sided {100.0 * (1.0 - analysis.alpha):g} % interval by Student’s t. p is that '
+        'of the paired t-test, p (Holm) is corrected by Holm (1979) over '
+        f'{family}, with α = {analysis.alpha:g}. Beside it stands the p-value of Wilcoxon’s '
+        f'signed-rank test, uncorrected. {flagged}')
+
+
+def _method(study: StudyFile, trials: int, used: int) -> str:
+    left_out = '' if used == trials else f' {trials - used} of {trials} trials are left out.'
+    return note(plain(method_of(study) + left_out))
+
+
+def _tests(data: StudyData, tests: Sequence[PlannedTest]) -> str:
+    units = {column.name: column.unit for column in data.trials_table.declaration.columns}
+    alpha = data.folder.study.analysis.alpha
+    rows = []
+    for each in tests:
+        test, unit = each.test, units[each.comparison.measure]
+        digits = _digits(test.difference)
+        rows.append((
+            _name(each), plain('' if unit == '1' else unit), str(test.participants),
+            number(test.first, digits), number(test.second, digits),
+            f'{number(test.difference, digits)} <small>[{number(test.low, digits)}; '
+            f'{number(test.high, digits)}]</small>',
+            f'{number(test.t, 2)} <small>({max(0, test.participants - 1)})</small>',
+            _WORDS[each.comparison.alternative], _p(test.p), _p(each.p_holm),
+            _p(test.p_signed_rank)))
+    return table(f'Differences within participants, with {100.0 * (1.0 - alpha):g} % intervals', (
+        '', 'unit', 'n', 'first', 'second', 'difference', 't <small>(df)</small>', 'tested', 'p',
+        'p (Holm)', 'p (Wilcoxon)'), rows, 'numbers')
+
+
+def _effects(tests: Sequence[PlannedTest]) -> str:
+    return table('Effect sizes', ('', 'd<sub>z</sub>', 'd<sub>av</sub>', 'g<sub>av</sub>'), [
+        (_name(each), number(each.test.d_z, 2), number(each.test.d_av, 2),
+         number(each.test.g_av, 2)) for each in tests], 'numbers') + note(
+        'By Lakens (2013): d<sub>z</sub> is the mean difference over the standard deviation of '
+        'the differences, d<sub>av</sub> over the mean of both levels’ standard deviations; '
+        'g<sub>av</sub> is d<sub>av</sub> with Hedges’ correction.')
+
+
+def _name(each: PlannedTest) -> str:
+    first, second = each.pair
+    return f'{plain(each.comparison.measure)}<br><small>{free(each.comparison.factor)}: ' \
+        f'{free(second)} − {free(first)}</small>'
+
+
+def _models(data: StudyData, rows: Sequence[Mapping[str, object]]) -> str:
+    missing = missing_extra()
+    if missing:
+        return note(f'For mixed models, install statsmodels: <code>{plain(missing)}</code>. '
+                    '<code>analysis.R</code> beside the tables has them for R.')
+    html = ''
+    for model in fit_models(data.folder.study, rows, data.factor_columns):
+        formula = model.formula.text(data.factor_columns)
+        html += table(f'Mixed model: <code>{plain(formula)}</code>', (
+            '', 'estimate', 'SE', '95 % interval', 'z', 'p'), list(_fixed(model)), 'numbers')
+        told = f'{model.trials} trials of {model.participants} participants'
+        if model.effects:
+            told += (f'; standard deviations: participants {_value(model.participant_sd)}, '
+                     f'residuals {_value(model.residual_sd)}')
+        html += note(plain(f'{told}.') + (
+            f' <strong>Do not trust this fit: {plain(model.problem)}.</strong>'
+            if model.problem else ''))
+    return html + note(
+        'By restricted maximum likelihood (statsmodels), of trials, with a random intercept of '
+        'each participant; a level’s estimate is its difference from the first level of its '
+        'factor. z and p are by the normal distribution, which is too sure with few participants: '
+        '<code>analysis.R</code> beside the tables fits the same model by lme4, and tests it with '
+        'Satterthwaite’s degrees of freedom.')
+
+
+def _fixed(model: MixedModel) -> Iterator[Sequence[str]]:
+    for each in model.effects:
+        yield (plain(each.name), _value(each.value), _value(each.error),
+               f'[{_value(each.low)}; {_value(each.high)}]', number(each.z, 2), _p(each.p))
+
+
+def _p(value: float) -> str:
+    if value != value:
+        return NOTHING
+    return '&lt; 0.001' if value < 0.001 else number(value, 3)
+
+
+def _value(value: float) -> str:
+    return number(value, _digits(value))
+
+
+def _digits(value: float) -> int:
+    return 4 if abs(value) < 0.1 else 3 if abs(value) < 1.0 else 2 if abs(value) < 100.0 else 1
