@@ -2,12 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report of a study: one file, with the numbers of the tables, for any answers."""
 
+import hashlib
 from html import unescape
 from pathlib import Path
 import re
 
 from crgame_ros.cli import main
 from crgame_ros.study.data.condition_section import within_halves
+from crgame_ros.study.data.preregistration import (
+    digests_of_folder,
+    PREREGISTRATION,
+    read_preregistration,
+)
 from crgame_ros.study.quality import PAGE, QualityBounds, TIMING
 from crgame_ros.study.session_journal import JOURNAL, SessionJournal
 import numpy as np
@@ -69,6 +75,32 @@ def test_planned_comparisons_are_those_of_the_table_and_of_the_script(studied: S
     for left, right in ('()', '[]', '{}'):
         assert script.count(left) == script.count(right)
     assert 'statsmodels' in html
+
+
+def test_the_report_names_the_preregistration_and_what_has_changed_since(copied: Path) -> None:
+    study, document = copied / 'study' / 'study.yaml', copied / PREREGISTRATION
+    assert main(['study', 'preregister', str(study), '--out', str(document)]) == 0
+    text = document.read_bytes()
+    # As `head -n -1 FILE | sha256sum` has it.
+    above, _, last = text.rstrip(b'\n').rpartition(b'\n')
+    digest = hashlib.sha256(above + b'\n').hexdigest()
+    assert last.decode() == f'SHA-256 of all lines above: {digest}'
+    for known in ('| 4 | ', 'mean of its signed speed', 'cv − idm', 'at most 100 ms',
+                  hashlib.sha256(study.read_bytes()).hexdigest(),
+                  'mean_speed_m_per_s ~ planner + (1 | participant)'):
+        assert known in text.decode()
+    assert main(['study', 'preregister', str(study), '--verify', str(document)]) == 0
+    registered = read_preregistration(document)
+    (copied / 'study' / 'consent.md').write_text('Do you agree now?')
+    assert main(['study', 'preregister', str(study), '--verify', str(document)]) == 1
+    assert 'consent.md has changed' in registered.differences(
+        digests_of_folder(copied / 'study'))
+    html = report_of(copied)
+    assert digest in html and 'consent.md has changed' in html
+    # What is there already is not overwritten, and a changed document is none.
+    assert main(['study', 'preregister', str(study), '--out', str(document)]) == 2
+    document.write_bytes(text.replace(b'at most 100 ms', b'at most 900 ms'))
+    assert main(['study', 'preregister', str(study), '--verify', str(document)]) == 2
 
 
 def test_it_has_participants_and_problems(studied: Studied) -> None:

@@ -59,7 +59,7 @@ def paired_test(first: NDArray[np.float64], second: NDArray[np.float64], alterna
     :param alpha: the interval is of 1 - alpha, and two-sided whatever the alternative.
     """
     # A slow import.
-    from scipy.stats import t as student
+    from scipy.special import stdtr, stdtrit
     count = len(first)
     nan = math.nan
     if count < 2:
@@ -68,11 +68,11 @@ def paired_test(first: NDArray[np.float64], second: NDArray[np.float64], alterna
     differences = second - first
     mean, sd = float(differences.mean()), float(differences.std(ddof=1))
     error, freedom = sd / math.sqrt(count), count - 1
-    half = error * float(student.ppf(1.0 - alpha / 2.0, freedom))
+    half = error * float(stdtrit(freedom, 1.0 - alpha / 2.0))
     spread = (float(first.std(ddof=1)) + float(second.std(ddof=1))) / 2.0
     t, d_av = (mean / error if error else nan), (mean / spread if spread else nan)
-    tail = {'two-sided': 2.0 * float(student.sf(abs(t), freedom)),
-            'greater': float(student.sf(t, freedom)), 'less': float(student.cdf(t, freedom))}
+    tail = {'two-sided': 2.0 * float(stdtr(freedom, -abs(t))),
+            'greater': float(stdtr(freedom, -t)), 'less': float(stdtr(freedom, t))}
     return PairedTest(
         count, float(first.mean()), float(second.mean()), mean - half, mean + half, t,
         tail[alternative], _signed_rank(differences, alternative), mean / sd if sd else nan,

@@ -18,6 +18,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.paths import config_directory, scenarios_directory
 from crgame_ros.software import software_with_commit
 from crgame_ros.study.conduct.live_drives import LiveDrives
+from crgame_ros.study.conduct.plan_commands import add_plan_arguments
 from crgame_ros.study.data.study_data_command import add_data_arguments, told_overdue
 from crgame_ros.study.desk.desk import Desk
 from crgame_ros.study.desk.server import serve_desk
@@ -120,6 +121,8 @@ Plan an experiment with people: who drives which trials in which order, and what
 
   crgame study new my_study        # a commented study file, with its pages
   crgame study check my_study/study.yaml
+  crgame study power my_study/study.yaml         # of the planned tests, by simulation
+  crgame study preregister my_study/study.yaml   # the plan as one document with a hash
   crgame study run my_study/study.yaml --participant P01
   crgame study data studies/my_study      # tables of what it has found so far
   crgame study report studies/my_study    # the same for people, one HTML file
@@ -155,6 +158,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     check.add_argument('--out', type=Path, metavar='DIR', help="folder of the study's data, whose "
                        'participants may be past retention (default: studies/NAME)')
     check.set_defaults(command=check_command)
+    add_plan_arguments(what)
     add_data_arguments(what)
 
 
@@ -189,6 +193,7 @@ def check_command(values: argparse.Namespace) -> int:
     """
     from crgame_ros.recording.progress import Progress
     from crgame_ros.study.check import check_study, length_of
+    from crgame_ros.study.conduct.plan_commands import check_planned_measures
     from crgame_ros.study.file import load_study
     from crgame_ros.study.trial_plan import plan_trials
     if not 0 <= values.participants <= 10_000:
@@ -197,6 +202,7 @@ def check_command(values: argparse.Namespace) -> int:
     say = partial(print, file=sys.stderr, flush=True)
     for line in told_overdue(study, values.out or Path('studies') / study.name):
         say(f'warning: {line}')
+    check_planned_measures(study)
     findings = check_study(study, Progress(say, 'driving a second of each condition'))
     for finding in findings:
         say(f'{finding.kind}: {finding.text}')

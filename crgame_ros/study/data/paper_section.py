@@ -9,8 +9,14 @@ import statistics
 from typing import Any
 
 from crgame_ros.analysis.report.text import free, note, number, plain, table
+from crgame_ros.errors import InputError
 from crgame_ros.schema.writing import write
 from crgame_ros.software import software_with_commit
+from crgame_ros.study.data.preregistration import (
+    digests_of_folder,
+    PREREGISTRATION,
+    read_preregistration,
+)
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.trials_table import measure_columns
 from crgame_ros.study.trial_plan import conditions_of
@@ -119,6 +125,9 @@ def _study(data: StudyData, told: Mapping[str, Any]) -> Iterator[Sequence[str]]:
     study = data.folder.study
     yield 'File', f'<code>{plain(told["file"])}</code>, SHA-256 ' \
         f'<code>{plain(told["files"][told["file"]][:16])}…</code>'
+    registered = data.folder.path / PREREGISTRATION
+    if registered.is_file():
+        yield 'Preregistration', _registered(data, registered)
     yield 'Seed of the orders', plain(study.seed)
     yield 'Seeds of the drives', plain(', '.join(map(str, told['random_seeds'])) or 'none yet')
     for block in study.blocks:
@@ -135,6 +144,17 @@ def _study(data: StudyData, told: Mapping[str, Any]) -> Iterator[Sequence[str]]:
     for name, words, unit in _GEOMETRY:
         yield words, _range(shown[name], unit)
     yield 'Eyes and mirrors in the vehicle', 'docs/driver_view.md, and the vehicle’s file'
+
+
+def _registered(data: StudyData, path: Path) -> str:
+    try:
+        registered = read_preregistration(path)
+    except InputError as error:
+        return f'<strong>{plain(error)}</strong>'
+    differences = registered.differences(digests_of_folder(data.folder.study_path.parent))
+    return f'<code>{plain(path.name)}</code>, SHA-256 <code>{registered.digest}</code>; ' + (
+        f'<strong>other files than registered: {plain("; ".join(differences))}</strong>'
+        if differences else 'the study’s files are those that it names')
 
 
 def _range(spread: Mapping[str, float] | None, unit: str) -> str:

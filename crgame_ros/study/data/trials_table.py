@@ -23,6 +23,7 @@ from crgame_ros.study.data.conducted_study import ConductedStudy
 from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.run_tables import RunTables
 from crgame_ros.study.data.study_row_table import flag_column, unlike, with_unit
+from crgame_ros.study.file import StudyFile
 from crgame_ros.study.quality import PAGE, TIMING
 from crgame_ros.study.trial_plan import PlannedTrial
 
@@ -144,6 +145,32 @@ def measure_columns() -> dict[str, Column]:
             and not (column.name.startswith('worst_') and column.name.endswith('_time_s'))}
 
 
+def declare_trials(study: StudyFile,
+                   asked: AskedQuestions) -> tuple[dict[str, Column], TableDeclaration]:
+    """
+    Return the columns of a study's factors by their names, and the declaration of the table.
+
+    :param asked: the study's questionnaires.
+    :raises InputError: if a question has the name of another column.
+    """
+    runs = {column.name: column for column in RUNS.columns}
+    fixed = [*_DRIVE, *(runs[name] for name in _RUN_COLUMNS), *_TIMING,
+             *measure_columns().values(), *TASK_COLUMNS, _ANSWERED]
+    taken = {column.name for column in (*_FIRST, *fixed)}
+    factors: dict[str, Column] = {}
+    for factor in study.factors:
+        name = unlike(factor.name, taken, '_level')
+        taken.add(name)
+        factors[factor.name] = Column(
+            name, TEXT, '', f'level of the factor {factor.name}', empty='its block does not '
+            'cross it', values=tuple(level.name for level in factor.levels))
+    answers = [column for scale in asked.after_trials.values()
+               for column in scale.columns(study.language)]
+    return factors, TableDeclaration(
+        'trials', 'a trial that counts', ('participant', 'trial'),
+        (*_FIRST, *factors.values(), *fixed, *_apart(answers, taken)))
+
+
 class TrialsTable:
     """
     The declaration of the table, and its rows.
@@ -155,24 +182,8 @@ class TrialsTable:
 
     def __init__(self, folder: ConductedStudy, asked: AskedQuestions) -> None:
         self._folder, self._asked = folder, asked
-        study = folder.study
         self._measures = measure_columns()
-        runs = {column.name: column for column in RUNS.columns}
-        fixed = [*_DRIVE, *(runs[name] for name in _RUN_COLUMNS), *_TIMING,
-                 *self._measures.values(), *TASK_COLUMNS, _ANSWERED]
-        taken = {column.name for column in (*_FIRST, *fixed)}
-        self.factors: dict[str, Column] = {}
-        for factor in study.factors:
-            name = unlike(factor.name, taken, '_level')
-            taken.add(name)
-            self.factors[factor.name] = Column(
-                name, TEXT, '', f'level of the factor {factor.name}', empty='its block does not '
-                'cross it', values=tuple(level.name for level in factor.levels))
-        answers = [column for scale in asked.after_trials.values()
-                   for column in scale.columns(study.language)]
-        self.declaration = TableDeclaration(
-            'trials', 'a trial that counts', ('participant', 'trial'),
-            (*_FIRST, *self.factors.values(), *fixed, *_apart(answers, taken)))
+        self.factors, self.declaration = declare_trials(folder.study, asked)
 
     def row(self, record: ParticipantRecord, attempt: TrialAttempt, run: RunTables | None,
             problem: str) -> dict[str, object]:

@@ -1,0 +1,221 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Writes the plan of a study as one document for a preregistration, and checks it later."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+import hashlib
+from pathlib import Path
+import re
+import tempfile
+
+from crgame_ros.analysis.tables.column import Column
+from crgame_ros.errors import InputError
+from crgame_ros.recording.run_folder import STUDY_FILE
+from crgame_ros.software import software_with_commit
+from crgame_ros.study.analysis.mixed_model import model_formulas
+from crgame_ros.study.analysis.power import Power, power_lines
+from crgame_ros.study.data.analysis_method import check_measures, method_of
+from crgame_ros.study.data.asked_questions import AskedQuestions
+from crgame_ros.study.data.trials_table import declare_trials
+from crgame_ros.study.file import Block, StudyFile
+from crgame_ros.study.folder import StudyFolder
+from crgame_ros.study.trial_plan import plan_trials
+from crgame_ros.yaml_text import read_text
+
+PREREGISTRATION = 'preregistration.md'
+_LAST = 'SHA-256 of all lines above: '
+_FILES = '## Files'
+_DIGEST = re.compile(r'([0-9a-f]{64})  (\S.*)')
+
+
+@dataclass(frozen=True)
+class SimulatedPower:
+    """
+    The power for the document.
+
+    :param powers: for each number of participants, of each test.
+    :param runs: simulated studies for each.
+    :param seed: of the simulation.
+    """
+
+    powers: Sequence[Sequence[Power]]
+    runs: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class Preregistration:
+    """
+    A document that has been read.
+
+    :param digest: SHA-256 of it.
+    :param files: SHA-256 of the study's files, by their names.
+    """
+
+    digest: str
+    files: Mapping[str, str]
+
+    def differences(self, files: Mapping[str, str]) -> list[str]:
+        """Return one text for each file that is another one now, is missing, or is new."""
+        return [f'{name} ' + ('is missing' if name not in files else 'is new'
+                              if name not in self.files else 'has changed')
+                for name in sorted({*self.files, *files})
+                if self.files.get(name) != files.get(name)]
+
+
+def digests_of_study(study: StudyFile, file: Path, pictures: Sequence[str]) -> dict[str, str]:
+    """
+    Return the SHA-256 of each file of a study, by its name in the folder `study` of its data.
+
+    :param pictures: of its pages.
+    :raises InputError: if a file cannot be read.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        StudyFolder(Path(folder)).keep_study(study, file, pictures)
+        return digests_of_folder((Path(folder) / STUDY_FILE).parent)
+
+
+def digests_of_folder(folder: Path) -> dict[str, str]:
+    """Return the SHA-256 of each file in a folder and below, by its relative name."""
+    return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+            for path in sorted(folder.rglob('*')) if path.is_file()}
+
+
+def read_preregistration(path: Path) -> Preregistration:
+    """
+    Read a document.
+
+    :raises InputError: if it is none, or has been changed since it was written.
+    """
+    text = read_text(path, 'preregistration')
+    above, found, digest = text.rpartition(_LAST)
+    digest = digest.strip()
+    if not found or _FILES not in above:
+        raise InputError('is no preregistration', str(path),
+                         'name a file of `crgame study preregister`')
+    if hashlib.sha256(above.encode()).hexdigest() != digest:
+        raise InputError('has been changed since it was written', str(path),
+                         'take the copy that was registered')
+    files = {name: value for value, name in _DIGEST.findall(above.rpartition(_FILES)[2])}
+    return Preregistration(digest, files)
+
+
+def preregistration_of(study: StudyFile, files: Mapping[str, str],
+                       power: SimulatedPower | None) -> str:
+    """
+    Return the document as Markdown; its last line is the SHA-256 of all lines above it.
+
+    :param files: of the study, with their SHA-256.
+    :raises InputError: if a planned measure is no column of the table of trials.
+    """
+    factors, declaration = declare_trials(study, AskedQuestions(study))
+    check_measures(study, declaration.columns)
+    columns = {name: column.name for name, column in factors.items()}
+    title = study.title.in_language(study.language) or study.name
+    lines = [f'# Preregistration: {title}', '', f'Study `{study.name}`, planned with crgame_ros.',
+             '', *_design(study), *_orders(study), *_measures(study, declaration.columns),
+             *_exclusion(study), *_analysis(study, columns), *_power(power), *_versions(study),
+             _FILES, '', 'The files of the study and what its games name, with their SHA-256:', '',
+             '```', *(f'{digest}  {name}' for name, digest in sorted(files.items())), '```', '']
+    text = '\n'.join(lines) + '\n'
+    return f'{text}{_LAST}{hashlib.sha256(text.encode()).hexdigest()}\n'
+
+
+def _design(study: StudyFile) -> Iterator[str]:
+    yield from ('## Design', '', f'{study.participants} participants are planned. All factors of '
+                'a block are crossed, and varied within participants.', '')
+    if study.factors:
+        yield from ('| factor | levels |', '|---|---|')
+        yield from (f'| {factor.name} | {", ".join(level.name for level in factor.levels)} |'
+                    for factor in study.factors)
+        yield ''
+    yield from ('| block | factors | repetitions | order |', '|---|---|---|---|')
+    for block in study.blocks:
+        names = ' × '.join(factor.name for factor in study.factors_of(block)) or 'one condition'
+        yield f'| {block.name} | {names} | {block.repetitions} | {_order(block)} |'
+    yield ''
+
+
+def _order(block: Block) -> str:
+    if block.sequences:
+        return 'sequences of the file, in turn'
+    return {'williams': 'Latin square balanced for carry-over (Williams 1949)',
+            'random': 'random for each participant and repetition', 'given': 'as in the file'}[
+                block.order]
+
+
+def _orders(study: StudyFile) -> Iterator[str]:
+    yield from ('## Orders', '', f'By the seed {study.seed}. Participants take the next free '
+                'place.', '', '| place | trials, in this order |', '|---|---|')
+    for place in range(study.participants):
+        trials = ', '.join(trial.condition.name for trial in plan_trials(study, place))
+        yield f'| {place + 1} | {trials} |'
+    yield ''
+
+
+def _measures(study: StudyFile, columns: Sequence[Column]) -> Iterator[str]:
+    planned = {each.measure for each in study.analysis.comparisons}
+    yield from ('## Measures', '', 'Columns of `trials.csv`, as its data dictionary defines them.',
+                '', '| measure | unit | definition | reference point | variant | no value |',
+                '|---|---|---|---|---|---|')
+    for column in columns:
+        if column.name in planned:
+            cells = (column.name, column.unit, column.definition, column.reference_point,
+                     column.variant, column.empty)
+            yield '| ' + ' | '.join(' '.join(cell.split()).replace('|', r'\|')
+                                    for cell in cells) + ' |'
+    yield ''
+
+
+def _exclusion(study: StudyFile) -> Iterator[str]:
+    quality = study.quality
+    beyond = {'mark': 'is marked', 'stop': 'is marked, and the experimenter decides whether it '
+              'comes again', 'repeat': f'comes again, at most {quality.repeats} times, and is '
+              'then marked'}[quality.beyond]
+    used = 'stay in the analysis' if study.analysis.flagged == 'use' \
+        else 'are left out of the analysis'
+    yield from ('## Exclusion and missing data', '', 'A trial beyond one of these bounds '
+                f'{beyond}. Trials that are marked {used}.', '', '| value | bound |', '|---|---|')
+    yield from (f'| {words} | {bound} |' for words, bound in quality.told())
+    yield from ('', 'Of each trial the last attempt that finished counts; one that was aborted '
+                'comes again. A trial that was left out, or whose measure has no value, is '
+                'missing.', '')
+
+
+def _analysis(study: StudyFile, columns: Mapping[str, str]) -> Iterator[str]:
+    yield from ('## Analysis', '')
+    if not study.analysis.comparisons:
+        yield from ('No comparison is planned.', '')
+        return
+    factors = {factor.name: factor for factor in study.factors}
+    yield from ('| measure | factor | difference | hypothesis | expected |',
+                '|---|---|---|---|---|')
+    for each in study.analysis.comparisons:
+        for first, second in each.pairs(factors[each.factor]):
+            hypothesis = {'two-sided': '≠ 0', 'greater': '> 0', 'less': '< 0'}[each.alternative]
+            expected = 'not stated' if each.effect is None else \
+                f'd_z = {each.effect:g}' if each.sd is None else \
+                f'{each.effect:g}, standard deviation {each.sd:g} (of a {each.sd_of})'
+            yield f'| {each.measure} | {each.factor} | {second} − {first} | {hypothesis} ' \
+                f'| {expected} |'
+    yield from ('', method_of(study), '', 'Effect sizes: d_z, d_av, and g_av with Hedges’ '
+                'correction (Lakens 2013).', '', 'Mixed models of the trials, by restricted '
+                'maximum likelihood, with the first level of each factor as its reference:', '')
+    for formula in model_formulas(study):
+        yield f'- `{formula.text(columns)}`, trials of {", ".join(formula.blocks)}'
+    yield ''
+
+
+def _power(power: SimulatedPower | None) -> Iterator[str]:
+    if power is not None:
+        yield from ('## Power', '', 'By simulation of the plan with the expected effects, '
+                    f'seed {power.seed}. The tests are those of the analysis.', '', '```',
+                    *power_lines(power.powers, power.runs), '```', '')
+
+
+def _versions(study: StudyFile) -> Iterator[str]:
+    yield from ('## Versions', '', '| what | version |', '|---|---|')
+    yield from (f'| {name} | {value or "unknown"} |'
+                for name, value in software_with_commit().items())
+    yield from (f'| seed of the orders | {study.seed} |', '')
