@@ -3,118 +3,14 @@
 """The command `crgame study`: experiments with people."""
 
 import argparse
-import asyncio
-from collections.abc import Callable
-import contextlib
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-import signal
 import sys
-from urllib.parse import urlsplit
 
-from crgame_ros.cockpit.access import Access
 from crgame_ros.errors import InputError
 from crgame_ros.paths import config_directory, scenarios_directory
-from crgame_ros.software import software_with_commit
-from crgame_ros.study.conduct.live_drives import LiveDrives
 from crgame_ros.study.conduct.plan_commands import add_plan_arguments
-from crgame_ros.study.data.study_data_command import add_data_arguments, told_overdue
-from crgame_ros.study.desk.desk import Desk
-from crgame_ros.study.desk.server import serve_desk
-from crgame_ros.study.file import StudyFile
-from crgame_ros.study.participant_session import ParticipantSession
-
-HOST = '127.0.0.1'
-# From "I am ready" to the first cycle [s].
-COUNTDOWN_S = 2.0
-# Time in which pages show the end and the experimenter may still add a note [s].
-LINGER_S = 5.0
-
-
-@dataclass(frozen=True)
-class SessionRequest:
-    """
-    The session to conduct.
-
-    :param study: its study.
-    :param folder: of the participant.
-    :param participant: anonymous id.
-    :param place: among all participants, from 0 on.
-    :param port: of the pages; the cockpit takes a later one.
-    """
-
-    study: StudyFile
-    folder: Path
-    participant: str
-    place: int
-    port: int
-
-
-def conduct(request: SessionRequest, say: Callable[[str], None]) -> bool:
-    """
-    Conduct a session until it is over or the program is ended; the next call resumes it.
-
-    :param say: prints one line.
-    :return: whether the session is over.
-    :raises CrgameError: if it cannot begin, or another process has the participant's session.
-    """
-    with ParticipantSession(request.study, request.folder, request.participant,
-                            request.place) as session:
-        if session.next_item is None:
-            say(f'{request.participant} is done: nothing is left')
-            return True
-        session.note_software(software_with_commit())
-        asyncio.run(_conduct(session, request, say))
-        return session.next_item is None
-
-
-async def _conduct(session: ParticipantSession, request: SessionRequest,
-                   say: Callable[[str], None]) -> None:
-    stop = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        loop.add_signal_handler(number, stop.set)
-    origin: list[str] = []
-    drives = LiveDrives(session, request.folder, lambda: desk.language, request.port + 1,
-                        lambda: ['--countdown', str(COUNTDOWN_S), '--framed-by', *origin])
-    desk = Desk(session, drives)
-    private = request.folder / '.private'
-    private.mkdir(parents=True, exist_ok=True, mode=0o700)
-    runner, lines = await serve_desk(desk, Access(HOST, request.port), private)
-    driving: asyncio.Task[None] | None = None
-    try:
-        for line in lines:
-            say(line)
-        address = urlsplit(lines[0].split()[-1])
-        origin.append(f'{address.scheme}://{address.netloc}')
-        driving = asyncio.create_task(drives.run())
-        await _until_over(session, driving, stop)
-    finally:
-        if driving is not None:
-            driving.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await driving
-        say('ending: recordings are finished')
-        await drives.close()
-        await runner.cleanup()
-
-
-async def _until_over(session: ParticipantSession, driving: asyncio.Task[None],
-                      stop: asyncio.Event) -> None:
-    """Wait for the last item, or for the end of the program."""
-    stopped = asyncio.create_task(stop.wait())
-    try:
-        while not stop.is_set() and session.next_item is not None:
-            if driving.done() and driving.exception() is not None:
-                # An error that no page can fix.
-                driving.result()
-            await asyncio.sleep(0.1)
-        if not stop.is_set():
-            await asyncio.wait([stopped], timeout=LINGER_S)
-    finally:
-        stopped.cancel()
-
+from crgame_ros.study.data.study_data_command import add_data_arguments
 
 DESCRIPTION = """\
 Plan an experiment with people: who drives which trials in which order, and what is asked.
@@ -194,6 +90,7 @@ def check_command(values: argparse.Namespace) -> int:
     from crgame_ros.recording.progress import Progress
     from crgame_ros.study.check import check_study, length_of
     from crgame_ros.study.conduct.plan_commands import check_planned_measures
+    from crgame_ros.study.data.study_data_command import told_overdue
     from crgame_ros.study.file import load_study
     from crgame_ros.study.trial_plan import plan_trials
     if not 0 <= values.participants <= 10_000:
@@ -231,6 +128,7 @@ def run_command(values: argparse.Namespace) -> int:
     require_ros()
     prepare_environment()
     from crgame_ros.launcher.interruption import print_now
+    from crgame_ros.study.conduct.session_run import conduct, SessionRequest
     study = load_study(values.file)
     participant = check_participant(values.participant)
     if not 1 <= values.port <= 65_000:

@@ -9,10 +9,9 @@ import sys
 from typing import Any, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
-from crgame_ros.study.data.study_data import StudyData
-from crgame_ros.study.data.study_data_folder import only_writer, write_study_data
 
-if TYPE_CHECKING:  # A slow import that other commands do not need.
+if TYPE_CHECKING:  # Slow imports that other commands do not need.
+    from crgame_ros.study.data.study_data import StudyData
     from crgame_ros.study.file import StudyFile
 
 
@@ -57,6 +56,7 @@ def data_command(values: argparse.Namespace) -> int:
     :raises InputError: if the folder holds no study, or cannot be written.
     """
     from crgame_ros.study.data.conducted_study import ConductedStudy
+    from crgame_ros.study.data.study_data_folder import only_writer, write_study_data
     folder = ConductedStudy(values.folder)
     with only_writer(folder.data):
         data = _read(folder, reports=not values.no_reports)
@@ -79,6 +79,7 @@ def report_command(values: argparse.Namespace) -> int:
     """
     from crgame_ros.analysis.report.file import check_report_path
     from crgame_ros.study.data.conducted_study import ConductedStudy
+    from crgame_ros.study.data.study_data_folder import only_writer
     from crgame_ros.study.data.study_report import write_study_report
     folder = ConductedStudy(values.folder)
     with only_writer(folder.data):
@@ -96,6 +97,7 @@ def rerun_command(values: argparse.Namespace) -> int:
     :raises InputError: if nothing can be repeated, or a planner is unknown.
     """
     from crgame_ros.study.data.conducted_study import ConductedStudy
+    from crgame_ros.study.data.study_data_folder import only_writer
     from crgame_ros.study.data.study_rerun import rerun_study
     folder = ConductedStudy(values.folder)
     with only_writer(folder.data):
