@@ -91,7 +91,7 @@ def test_the_command_tells_it(bag: Path, capsys: pytest.CaptureFixture[str]) -> 
     """It prints text, or JSON beside the earlier keys, also with an event as request."""
     assert main(['measure', str(bag), '--json']) == 0
     found = json.loads(capsys.readouterr().out)
-    assert set(found) == {'thresholds', 'vehicles', 'behaviour'}
+    assert set(found) == {'thresholds', 'vehicles', 'rules', 'behaviour'}
     assert set(found['behaviour']) == {'hv0', 'av0'}
     assert found['behaviour']['av0']['take_overs'][0]['take_over_hands_on'] == pytest.approx(1.01)
     assert main(['measure', str(bag), '--request', 'slow-zone']) == 0
