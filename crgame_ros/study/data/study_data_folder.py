@@ -29,10 +29,6 @@ from crgame_ros.yaml_text import read_text
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-if TYPE_CHECKING:  # A slow import that other commands do not need.
-    pass
-
-
 _WHOSE = (Column('participant', TEXT, '', 'anonymous id of the driver'),
           Column('trial', INTEGER, '1', 'number of the trial'),
           Column('condition', TEXT, '', 'of the trial'))
@@ -106,10 +102,6 @@ def _earlier(out: Path, made_of: list[list[object]]) -> dict[str, int] | None:
         return rows if len(rows) == len(DECLARATIONS) else None
     except (InputError, OSError, ValueError, LookupError, TypeError, pa.ArrowInvalid):
         return None
-
-
-if TYPE_CHECKING:  # A slow import that other commands do not need.
-    pass
 
 
 RUNS, PROVENANCE, LOCK, R_SCRIPT = 'runs', 'provenance.json', '.lock', 'analysis.R'
