@@ -7,7 +7,6 @@ from contextlib import contextmanager
 import fcntl
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from crgame_ros.analysis.tables.column import Column, INTEGER, TableDeclaration, TEXT
 from crgame_ros.analysis.tables.data_package import (
