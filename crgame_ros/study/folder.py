@@ -24,6 +24,8 @@ from crgame_ros.whole_file import write_whole
 DRIVES, FILES = 'drives.json', 'files'
 # In the folder of a study: a line for each withdrawal, and those that have not finished.
 WITHDRAWALS, WITHDRAWING = 'withdrawals.jsonl', '.withdrawing'
+# Says that a study's data have been made: nobody took part.
+MADE = 'made.json'
 
 
 def keep_drives(study: StudyFile, folder: Path) -> None:
@@ -192,8 +194,12 @@ class StudyFolder:
 
         :param file: of the study.
         :param pictures: of its pages, relative to its folder.
-        :raises InputError: if one has changed since, or cannot be written.
+        :raises InputError: if one has changed since, or cannot be written, or the folder has
+            made data.
         """
+        if (self.root / MADE).exists():
+            raise InputError('has made data, which people must not be mixed with', str(self.root),
+                             'choose another folder with --out')
         folder = (self.root / STUDY_FILE).parent
         files = {STUDY_FILE.name: file,
                  **{name: study.base / name for name in (*_beside(study), *pictures)}}

@@ -94,16 +94,20 @@ class SimulatedTrials:
     :param study: their study.
     :param participants: their number; their places are 0, 1, …
     :param models: of the measures.
+    :ivar measures: names of the measures.
+    :ivar participants: ids of the participants.
     :ivar rows: one for each trial, as the table of trials has them.
     """
 
     def __init__(self, study: StudyFile, participants: int,
                  models: dict[str, MeasureModel]) -> None:
         self._models = models
+        self.measures = tuple(models)
+        self.participants = tuple(f'P{place + 1:02}' for place in range(participants))
         planned = [(place, trial) for place in range(participants)
                    for trial in plan_trials(study, place)]
         self.rows: list[dict[str, Any]] = [
-            {'participant': f'P{place + 1:02}', 'trial': trial.number, 'block': trial.block,
+            {'participant': self.participants[place], 'trial': trial.number, 'block': trial.block,
              **dict(_levels(trial))} for place, trial in planned]
         self._people = np.array([place for place, _ in planned], dtype=np.intp)
         self._count = participants

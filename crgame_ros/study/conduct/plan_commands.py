@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The commands `crgame study power` and `preregister`: before the first participant."""
+"""The commands `crgame study power`, `preregister`, `make-data`: before the first session."""
 
 import argparse
 from functools import partial
@@ -34,6 +34,16 @@ def add_plan_arguments(what: Any) -> None:
                                  'document')
     _power_arguments(registered, None)
     registered.set_defaults(command=preregister_command)
+    made = what.add_parser('make-data', help='make the data of sessions that nobody has done, to '
+                                             'try the analysis')
+    made.add_argument('file', type=Path, help='study file')
+    made.add_argument('--out', type=Path, required=True, metavar='DIR', help='folder to make')
+    made.add_argument('--participants', type=int, metavar='N',
+                      help="their number (default: the study's)")
+    made.add_argument('--effects', action='store_true',
+                      help='with the effects that the plan states (default: with none)')
+    made.add_argument('--seed', type=int, default=0, metavar='N', help='of the data (default: 0)')
+    made.set_defaults(command=make_command)
 
 
 def _power_arguments(parser: argparse.ArgumentParser, numbers: str | None) -> None:
@@ -139,4 +149,28 @@ def preregister_command(values: argparse.Namespace) -> int:
     text = preregistration_of(study, files, power)
     write_text(text, out)
     print(f'{out}: {text.splitlines()[-1]}')
+    return 0
+
+
+def make_command(values: argparse.Namespace) -> int:
+    """
+    Make data.
+
+    :raises InputError: if the folder exists, or an option is wrong.
+    """
+    from crgame_ros.recording.progress import Progress
+    from crgame_ros.study.data.made_study import make_study
+    from crgame_ros.study.desk.page_markdown import pictures_of
+    from crgame_ros.study.file import load_study
+    study = load_study(values.file)
+    check_planned_measures(study)
+    participants = study.participants if values.participants is None else values.participants
+    if not 1 <= participants <= _MOST:
+        raise InputError(f'is {participants}', '--participants', f'give 1 to {_MOST}')
+    if values.seed < 0:
+        raise InputError(f'is {values.seed}', '--seed', 'give 0 or more')
+    say = partial(print, file=sys.stderr, flush=True)
+    make_study(study, values.file, pictures_of(study), values.out, participants, values.seed,
+               values.effects, Progress(say, 'making sessions'))
+    print(f'{values.out}: made data of {participants} participants; nobody took part')
     return 0

@@ -35,7 +35,7 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
     files = sorted(path for path in folder.study_path.parent.rglob('*') if path.is_file())
     return {
         'study': study.name, 'title': study.title.in_language(study.language),
-        'file': folder.relative(folder.study_path), 'seed': study.seed,
+        'file': folder.relative(folder.study_path), 'seed': study.seed, 'made': data.made,
         'files': {folder.relative(path): _digest(path) for path in files},
         'data_written_by': software_with_commit(),
         # As noted by the sessions: more than one if it changed during the study.

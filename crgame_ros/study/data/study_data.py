@@ -256,6 +256,11 @@ class StudyData:
         return {name: column.name for name, column in self.trials_table.factors.items()}
 
     @property
+    def made(self) -> bool:
+        """Return whether there are trials that nobody drove."""
+        return any(each.row['made'] for each in self.trials)
+
+    @property
     def problems(self) -> list[str]:
         """Return the trials without measures, with the reasons."""
         return [f'{each.record.id}, trial {each.attempt.trial.number}: {each.row["problem"]}'
@@ -309,6 +314,8 @@ def _run(folder: ConductedStudy, record: ParticipantRecord, attempt: TrialAttemp
          runs: RunTablesCache, say: Callable[[str], object],
          progress: Callable[[str, float], object]) -> tuple[RunTables | None, str]:
     """Measure a trial's run; return its tables, or None and the reason."""
+    if isinstance(attempt.says('made'), dict):
+        return None, ''
     if attempt.folder is None:
         return None, 'the journal names no recording'
     problem = finished_recording(attempt.folder, record.folder, say)

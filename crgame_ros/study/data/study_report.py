@@ -42,6 +42,8 @@ def study_html(data: StudyData) -> str:
     """Return the page as HTML."""
     study = data.folder.study
     title = study.title.in_language(study.language) or study.name
+    if data.made:
+        title = f'Made data: {title}'
     sections = [
         Section('conditions', 'Conditions', condition_section(data)),
         *([Section('planned', 'Planned comparisons', planned_section(data))]
@@ -59,8 +61,9 @@ def _facts(data: StudyData) -> list[tuple[str, str]]:
     planned = sum(row['trials_planned'] for row in _rows(data, 'participants'))
     withdrawn = data.folder.withdrawals
     flagged = sum(trial.row['timing_flag'] for trial in data.trials)
+    made = [('made data', '<strong>nobody took part</strong>')] if data.made else []
     return [
-        ('participants', f'{len(data.records)}'), ('of them complete', f'{complete}'),
+        *made, ('participants', f'{len(data.records)}'), ('of them complete', f'{complete}'),
         ('planned', f'{data.folder.study.participants}'),
         *([('withdrawn, data deleted', str(withdrawn))] if withdrawn else []),
         ('trials that count', f'{len(data.trials)} <small>of {planned}</small>'),

@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, UTC
+import math
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +94,7 @@ _DRIVE = (
     Column('report', TEXT, '', 'report of the run', empty='there is none'),
     Column('game_file', TEXT, '', 'the game as it was driven', empty='there is none'),
     Column('run', TEXT, '', 'its name in the tables in runs/', empty=UNMEASURED),
+    flag_column('made', 'whether crgame study make-data has made its measures: nobody drove'),
     Column('problem', TEXT, '', 'why it has no measures', empty='it has some'))
 # Columns of the table of runs.
 _RUN_COLUMNS = ('benchmark_id', 'scenario_sha256', 'game_sha256', 'duration_s',
@@ -205,7 +207,7 @@ class TrialsTable:
         for kind, checks in (('timing', TIMING), ('page', PAGE)):
             faults = self._folder.study.quality.faults(row, checks)
             row |= {f'{kind}_flag': bool(faults), f'{kind}_reason': '; '.join(faults)}
-        return row | self._answers(record, trial)
+        return row | self._answers(record, trial) | self._made(attempt)
 
     def _drive(self, record: ParticipantRecord, attempt: TrialAttempt) -> dict[str, object]:
         settings, folder = attempt.trial.condition.settings, attempt.folder
@@ -225,6 +227,17 @@ class TrialsTable:
                 found = sorted(folder.glob(pattern))
                 row[name] = self._folder.relative(found[0]) if found else None
         return row
+
+    def _made(self, attempt: TrialAttempt) -> dict[str, object]:
+        """Return made values, which replace the scores of made answers as well."""
+        made = attempt.says('made')
+        if not isinstance(made, Mapping):
+            return {'made': False}
+        kinds = {column.name: column.type for column in self.declaration.columns}
+        return {'made': True} | {
+            name: round(value) if kinds[name] == INTEGER else value
+            for name, value in made.items() if kinds.get(name) in (INTEGER, NUMBER)
+            and isinstance(value, int | float) and math.isfinite(value)}
 
     def _measured(self, attempt: TrialAttempt, run: RunTables) -> dict[str, object]:
         summary = run.summary
