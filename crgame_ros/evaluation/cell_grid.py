@@ -5,6 +5,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, Self
@@ -128,13 +129,14 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
                   for label, value in plan.perceptions().items()}
     traffic = {label: value if value in (None, OWN) else with_contents(write(value), store)
                for label, value in plan.traffics().items()}
-    places = [
+    places: list[tuple[Callable[[Path, ContentStore], CellScene], Path]] = [
         *((scene_of_game, path) for path in files_of(
             plan.games, plan.base, GAME_SUFFIXES, 'game file')),
         *((scene_of_scenario, path) for path in files_of(
             find_scenarios(plan.scenarios, plan.base), plan.base, SCENARIO_SUFFIXES,
             'CommonRoad file')),
-        *((scene_of_run, path) for path in runs_of(plan.humans, plan.base))]
+        *((partial(scene_of_run, until_take_over=plan.take_overs == 'end'), path)
+          for path in runs_of(plan.humans, plan.base))]
     scenes: list[CellScene] = []
     for number, (make, path) in enumerate(places):
         scene = make(path, store)

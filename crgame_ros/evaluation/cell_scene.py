@@ -22,7 +22,7 @@ from crgame_ros.occupancy.map_file import read_map_file
 from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.recorded_game import read_recorded_game
 from crgame_ros.recording.recorded_inputs import with_recorded_events
-from crgame_ros.recording.run_cycles import replay_inputs
+from crgame_ros.recording.run_cycles import replay_inputs, ReplayInputs
 from crgame_ros.recording.run_folder import folder_name, participant_folder, recording_in
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
@@ -124,19 +124,23 @@ def scene_of_scenario(path: Path, store: ContentStore) -> CellScene:
     return _scene(game, load_scenario(path), store)
 
 
-def scene_of_run(path: Path, store: ContentStore) -> CellScene:
+def scene_of_run(path: Path, store: ContentStore, until_take_over: bool = False) -> CellScene:
     """
     Build the scene of a recorded run: copy its game and its humans' inputs into a store.
 
     :param path: folder of the run, or its recording.
+    :param until_take_over: whether the run ends where a person took over an AV, if one did;
+        nobody else needs to drive then.
     :raises InputError: if the recording cannot be repeated.
     """
     bag = recording_in(path)
     recorded = read_recorded_game(bag, other_planners=True)
-    if not recorded.game.humans:
+    if not recorded.game.humans and not until_take_over:
         raise InputError('no vehicle was driven in it', str(path),
                          'name its game or scenario instead')
     inputs = replay_inputs(bag)
+    if until_take_over:
+        inputs = before_take_over(inputs, [human.id for human in recorded.game.humans], path)
     game = with_recorded_events(recorded.game, read_run_events(bag).fired)
     humans = tuple(replace(human, driver='idle') for human in game.humans)
     duration_s = len(inputs.dt_eff_s) / game.timing.rate
@@ -146,6 +150,24 @@ def scene_of_run(path: Path, store: ContentStore) -> CellScene:
     digest = store.put(Content(INPUTS, {INPUTS: stream.getvalue()}))
     return _scene(replace(game, humans=humans, duration=min(game.duration, duration_s)),
                   recorded.loaded, store, human=folder_name(path), inputs=digest)
+
+
+def before_take_over(inputs: ReplayInputs, humans: Sequence[str], path: Path) -> ReplayInputs:
+    """
+    Return the inputs of the humans until a person took over an AV; all of them if nobody did.
+
+    :param humans: ids of the driven vehicles.
+    :param path: of the run, for messages.
+    :raises InputError: if an AV was driven by a person from the beginning.
+    """
+    first = len(inputs.dt_eff_s)
+    for name, rows in inputs.commands.items():
+        if name not in humans:
+            first = min(first, int(np.argmax(~np.isnan(rows[:, 0]))))
+    if first == 0:
+        raise InputError('a person drove the AV from the beginning', str(path), 'leave it out')
+    return ReplayInputs({name: rows[:first] for name, rows in inputs.commands.items()
+                         if name in humans}, inputs.dt_eff_s[:first])
 
 
 def participant_labels(runs: Sequence[Path]) -> list[str]:

@@ -5,7 +5,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.perception_spec import PerceptionSpec
@@ -70,6 +70,8 @@ class EvaluationPlan:
     :param scenarios: CommonRoad files, folders of them, benchmark ids, patterns of ids such as
         `USA_*`; no human takes part.
     :param humans: recorded runs, whose humans drive again as they did, in the recorded game.
+    :param take_overs: what becomes of take-overs of AVs in these runs: `replay` repeats their
+        commands; `end` repeats a run up to the first one, also one in which nobody else drives.
     :param planners: planners of the AVs.
     :param seeds: number of seeds, from 0 on, or a list of seeds.
     :param perception: perception of the AVs, by label; `own` is that of the games.
@@ -88,6 +90,7 @@ class EvaluationPlan:
     games: Annotated[tuple[str, ...], Listed(noun='file')] = ()
     scenarios: Annotated[tuple[str, ...], Listed(noun='file')] = ()
     humans: Annotated[tuple[str, ...], Listed(noun='run')] = ()
+    take_overs: Literal['replay', 'end'] = 'replay'
     planners: Annotated[tuple[PlannerChoice, ...], Listed(noun='planner')] = (
         PlannerChoice(OWN),)
     seeds: object = 1

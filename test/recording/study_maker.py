@@ -126,14 +126,18 @@ class StudyMaker:
         before = {entry.get('run') for entry in session.journal.entries} - {None, ''}
         return 'runs/1' if not before else f'runs/1/run_{len(before) + 1}'
 
+    def drivers(self, commands: np.ndarray) -> dict[str, ReplayDriver]:
+        """Return who gives these commands."""
+        return {'hv0': ReplayDriver(commands)}
+
     def record(self, session: ParticipantSession, trial: PlannedTrial, run: str,
                rng: np.random.Generator, finished: bool = True) -> Path:
         """Drive a trial, and leave its recording."""
         game = trial_game(trial.condition.settings, 'idle')
         commands = rng.uniform((0, 0, -0.05, 0), (1, 0.2, 0.05, 0), (1000, 4))
         setup = build_setup(replace(game, drivability=replace(game.drivability, stop=False)))
-        result = run_offline(setup, duration_s=DURATION_S, drivers={
-            'hv0': ReplayDriver(commands)}, check_drivability=False)
+        result = run_offline(setup, duration_s=DURATION_S, drivers=self.drivers(commands),
+                             check_drivability=False)
         folder = session.journal.path.parent / run
         folder.mkdir(parents=True, exist_ok=True)
         self.recorder.ours(folder / 'bag', [

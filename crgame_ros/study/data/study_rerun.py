@@ -3,6 +3,7 @@
 """Reruns a study's recorded drivers against other planners, and compares the results."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 import json
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,11 @@ from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDecl
 from crgame_ros.analysis.tables.data_package import data_package, PACKAGE_FILE, WrittenTable
 from crgame_ros.analysis.tables.vehicles import VEHICLES
 from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.evaluation.cell_scene import before_take_over
 from crgame_ros.recording.export import prepare_folder
 from crgame_ros.recording.run_cycles import replay_inputs
 from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.simulation.av_assignment import OWN
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
 from crgame_ros.study.data.study_row_table import csv_of_table, table_of_rows, with_unit
 from crgame_ros.study.data.trials_table import PARTICIPANT, TRIAL
@@ -27,13 +30,15 @@ COMPARED = ('distance', 'mean_speed', 'max_speed', 'min_acceleration', 'worst_ga
             'score_no_collision_at_fault', 'score_progress', 'score_comfort')
 RECORDED, RERUN = 'recorded', 'rerun'
 COMPARISON = 'comparison'
+# Folder of the evaluation of trials in which the participant rode, beside the others.
+RIDDEN = 'ridden'
 FILE = f'{COMPARISON}.csv'
 
 
 def comparison_declaration() -> TableDeclaration:
     """Return the declaration of the comparison table."""
     known = {column.name: column for column in VEHICLES.columns}
-    pairs = [with_unit(known[name], f'{when}_') for name in COMPARED
+    pairs = [with_unit(_declared(known[name], when), f'{when}_') for name in COMPARED
              for when in (RECORDED, RERUN)]
     return TableDeclaration(
         COMPARISON, 'a vehicle of a trial, driven again against a planner',
@@ -48,14 +53,25 @@ def comparison_declaration() -> TableDeclaration:
                    empty='it was not computed'),
             Column('status', TEXT, '', 'how the run ended now, as in the evaluation'),
             Column('reason', TEXT, '', 'why it failed', empty='it did not'),
+            Column('until_s', NUMBER, 's', 'when the participant took over the AV: the run is '
+                   'driven again up to then', variant="on the run's clock",
+                   empty='the participant drove, or took over no AV'),
             *pairs, Column('recorded_duration_s', NUMBER, 's', 'of the recorded run'),
             Column('rerun_duration_s', NUMBER, 's', 'simulated now', empty='it failed')))
+
+
+def _declared(column: Column, when: str) -> Column:
+    empty = '; '.join(filter(None, (column.empty, 'until_s has a value')))
+    return column if when == RERUN else replace(column, empty=empty)
 
 
 def rerun_study(data: StudyData, planners: Sequence[str], out: Path, workers: int | None,
                 say: Callable[[str], object]) -> list[str]:
     """
     Replay the drivers of all trials that count against each planner.
+
+    Trials in which the participant rode in an AV are driven up to the take-over, and against the
+    recorded planner too (`own`): the recorded measures are of the whole drive.
 
     :param planners: of all AVs.
     :param out: folder of the evaluation, with a folder for each seed if trials differ in it.
@@ -70,14 +86,17 @@ def rerun_study(data: StudyData, planners: Sequence[str], out: Path, workers: in
     if not trials:
         raise InputError('no trial of a person and an AV can be repeated', str(data.folder.path),
                          'run some first')
-    by_seed: dict[int, list[CountedTrial]] = {}
+    groups: dict[tuple[int, bool], list[CountedTrial]] = {}
     for trial in trials:
-        by_seed.setdefault(int(trial.row['random_seed']), []).append(trial)
+        groups.setdefault((int(trial.row['random_seed']), _is_ridden(trial)), []).append(trial)
+    seeds, kinds = ({key[part] for key in groups} for part in (0, 1))
     rows: list[dict[str, Any]] = []
-    for seed, of_seed in sorted(by_seed.items()):
-        folder = out if len(by_seed) == 1 else out / f'seed-{seed}'
-        labels = _evaluated(of_seed, planners, seed, folder, workers)
-        rows += _compared(of_seed, labels, folder)
+    for (seed, ridden), of_group in sorted(groups.items(), key=lambda item: item[0]):
+        folder = out if len(seeds) == 1 else out / f'seed-{seed}'
+        if ridden and len(kinds) > 1:
+            folder /= RIDDEN
+        labels = _evaluated(of_group, planners, seed, folder, workers, ridden)
+        rows += _compared(of_group, labels, folder)
     rows.sort(key=lambda row: (row['participant'], row['trial'], row['planner'], row['vehicle']))
     _write(rows, out, data.folder.study.name)
     return [_summarize(rows, planner) for planner in dict.fromkeys(row['planner'] for row in rows)]
@@ -86,15 +105,18 @@ def rerun_study(data: StudyData, planners: Sequence[str], out: Path, workers: in
 def _can_be_repeated(trial: CountedTrial, say: Callable[[str], object]) -> bool:
     """Return whether all inputs of a trial's driver are known; print the reason if not."""
     reason = trial.row['problem']
-    if trial.run is not None and not trial.run.summary['humans']:
+    if trial.row['made']:
+        reason = 'it is made'
+    elif trial.run is not None and not _is_ridden(trial) \
+            and trial.row['vehicle'] not in trial.run.summary['humans']:
         reason = 'no vehicle was driven in it'
-    elif trial.run is not None and trial.row['vehicle'] not in trial.run.summary['humans']:
-        reason = 'the participant sat in an AV'
     elif trial.run is not None and not trial.run.summary['planners']:
         reason = 'no AV takes part'
     elif trial.attempt.folder is not None and not reason:
         try:
-            replay_inputs(recording_in(trial.attempt.folder))
+            inputs = replay_inputs(recording_in(trial.attempt.folder))
+            if _is_ridden(trial) and trial.run is not None:
+                before_take_over(inputs, list(trial.run.summary['humans']), trial.attempt.folder)
         except CrgameError as error:
             reason = str(error)
     if reason:
@@ -102,8 +124,20 @@ def _can_be_repeated(trial: CountedTrial, say: Callable[[str], object]) -> bool:
     return not reason
 
 
+def _is_ridden(trial: CountedTrial) -> bool:
+    """Return whether the participant's seat was an AV."""
+    return trial.run is not None and trial.row['vehicle'] in trial.run.summary['planners']
+
+
+def _taken_over_s(trial: CountedTrial) -> float | None:
+    """Return when an AV first obeyed a person; None if none did."""
+    if trial.run is None or not _is_ridden(trial):
+        return None
+    return min(trial.run.table('take_overs').column('seat_s').to_pylist(), default=None)
+
+
 def _evaluated(trials: Sequence[CountedTrial], planners: Sequence[str], seed: int, folder: Path,
-               workers: int | None) -> list[str]:
+               workers: int | None, ridden: bool) -> list[str]:
     """Run or resume the evaluation; return its names of the recorded runs."""
     from crgame_ros.evaluation.dask_cluster import default_workers
     from crgame_ros.evaluation.evaluation import Computing, evaluate
@@ -112,8 +146,10 @@ def _evaluated(trials: Sequence[CountedTrial], planners: Sequence[str], seed: in
     from crgame_ros.evaluation.progress import EvaluationProgress
     humans = [str(trial.attempt.folder.resolve()) for trial in trials
               if trial.attempt.folder is not None]
-    plan = parse_plan({'humans': humans, 'planners': list(planners), 'seeds': [seed]},
-                      '--planner', Path.cwd())
+    given: dict[str, Any] = {'humans': humans, 'planners': list(planners), 'seeds': [seed]}
+    if ridden:
+        given |= {'take_overs': 'end', 'planners': list(dict.fromkeys((OWN, *planners)))}
+    plan = parse_plan(given, '--planner', Path.cwd())
     evaluate(plan, folder, Computing(workers=default_workers() if workers is None else workers),
              EvaluationProgress())
     grid = json.loads((folder / GRID_FILE).read_text('utf-8'))['grid']
@@ -140,13 +176,15 @@ def _compared(trials: Sequence[CountedTrial], labels: Sequence[str],
 def _row(trial: CountedTrial, cell: Mapping[str, object], recorded: Mapping[str, object],
          now: Mapping[str, object]) -> dict[str, object]:
     known = {column.name: column for column in VEHICLES.columns}
+    until_s = _taken_over_s(trial)
+    comparable = recorded if until_s is None else {}
     values = {with_unit(known[name], f'{when}_').name: row.get(name) for name in COMPARED
-              for when, row in ((RECORDED, recorded), (RERUN, now))}
+              for when, row in ((RECORDED, comparable), (RERUN, now))}
     return {'participant': trial.record.id, 'trial': trial.attempt.trial.number,
             'condition': trial.attempt.trial.condition.name, 'vehicle': recorded['id'],
             'role': recorded['role'], 'recorded_planner': trial.row['av_planner'],
             'planner': cell['planner'], 'random_seed': cell['seed'], 'cell': cell['cell'],
-            'status': cell['status'], 'reason': cell['reason'], **values,
+            'status': cell['status'], 'reason': cell['reason'], 'until_s': until_s, **values,
             'recorded_duration_s': trial.row['duration_s'],
             'rerun_duration_s': cell['simulated_s']}
 
