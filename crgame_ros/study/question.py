@@ -93,6 +93,30 @@ class SliderQuestion:
 
 
 @dataclass(frozen=True)
+class VasQuestion:
+    """
+    A question with a visual analogue scale: a bare line, unmarked at first, from 0 to 100.
+
+    :param left: label of the left end, 0.
+    :param right: label of the right end, 100.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    left: Text = LocalText()
+    right: Text = LocalText()
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Return the least and the greatest answer."""
+        return 0.0, 100.0
+
+    def refusal(self, answer: Any) -> str:
+        """Return why an answer is invalid, empty if it is valid."""
+        return '' if _finite(answer) and 0.0 <= answer <= 100.0 else 'give 0 to 100'
+
+
+@dataclass(frozen=True)
 class ChoiceQuestion:
     """
     A question with one choice, or several choices.
@@ -183,10 +207,11 @@ class TextQuestion:
         return '' if fits else f'give {self.longest} characters at most'
 
 
-QuestionKind = LikertQuestion | SliderQuestion | ChoiceQuestion | NumberQuestion | TextQuestion
+QuestionKind = (LikertQuestion | SliderQuestion | VasQuestion | ChoiceQuestion | NumberQuestion
+                | TextQuestion)
 KINDS: dict[str, type[QuestionKind]] = {
-    'likert': LikertQuestion, 'slider': SliderQuestion, 'choice': ChoiceQuestion,
-    'number': NumberQuestion, 'text': TextQuestion}
+    'likert': LikertQuestion, 'slider': SliderQuestion, 'vas': VasQuestion,
+    'choice': ChoiceQuestion, 'number': NumberQuestion, 'text': TextQuestion}
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ class Score:
     :param factor: multiplies the result.
     :param flipped: the items that count with the opposite sign.
     :param offset: added to each answer first.
+    :param shift: added to the result, after the factor.
     :param pairs: names of the questions that choose between two items, for `tally`.
     """
 
@@ -45,6 +46,7 @@ class Score:
     factor: float = 1.0
     flipped: Annotated[tuple[str, ...], Listed(noun='item')] = ()
     offset: float = 0.0
+    shift: float = 0.0
     pairs: Annotated[tuple[str, ...], Listed(noun='question')] = ()
 
     def bounds(self, questions: Sequence[Question]) -> tuple[float, float]:
@@ -62,7 +64,7 @@ class Score:
         else:
             count = 1 if self.how == 'sum' else len(self.items)
             found = sum(lows) / count, sum(highs) / count
-        low, high = sorted(self.factor * end for end in found)
+        low, high = sorted(self.shift + self.factor * end for end in found)
         return low, high
 
     def _signed(self, item: str, value: float) -> float:
@@ -77,15 +79,15 @@ class Score:
                   for item, value in zip(self.items, values, strict=True)
                   if isinstance(value, int | float)]
         if self.how == 'sum':
-            return self.factor * sum(signed)
+            return self.shift + self.factor * sum(signed)
         if self.how == 'mean':
-            return self.factor * sum(signed) / len(signed)
+            return self.shift + self.factor * sum(signed) / len(signed)
         chosen = [answers.get(name) for name in self.pairs]
         weights = [chosen.count(item) for item in self.items]
         if None in chosen or not sum(weights):
             return math.nan
-        return self.factor * sum(weight * value for weight, value in
-                                 zip(weights, signed, strict=True)) / sum(weights)
+        return self.shift + self.factor * sum(weight * value for weight, value in zip(
+            weights, signed, strict=True)) / sum(weights)
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,7 @@ class Questionnaire:
     :param title: its heading.
     :param text: shown before its questions.
     :param citation: its source.
+    :param matrix: whether successive questions with the same points are rows of one table.
     :param questions: in their order.
     :param scores: of the answers.
     """
@@ -108,6 +111,7 @@ class Questionnaire:
     title: Text = LocalText()
     text: Text = LocalText()
     citation: str = ''
+    matrix: bool = False
     scores: Annotated[tuple[Score, ...], Listed(0, 50, 'score', 'name')] = ()
 
     def check(self) -> None:

@@ -281,3 +281,22 @@ test('a question and its error are named for screen readers', () => {
   const ids = [...root.querySelectorAll('[id]')].map(({ id }) => id);
   assert.equal(new Set(ids).size, ids.length);
 });
+
+test('successive questions on one scale are rows of a table, and answered as any other', () => {
+  const row = (name, more = {}) => ({ ...LIKERT, name, ...more });
+  const shown = { title: '', text: '', matrix: true, questions: [row('a'), row('b'), SLIDER,
+    row('c'), row('d', { right: 'mostly' }), row('e', { right: 'mostly' })] };
+  root.replaceChildren(questionForm(shown, words, new Draft('m', () => now_s),
+    (answers) => told.push(answers)));
+  const tables = [...root.querySelectorAll('.matrix')].map((node) =>
+    [...node.querySelectorAll('.question')].map(({ dataset }) => dataset.name));
+  assert.deepEqual(tables, [['a', 'b'], ['c'], ['d', 'e']]);
+  assert.deepEqual([...root.querySelectorAll('.matrix-head')].map(textOf),
+    ['neveralways', 'neveralways', 'nevermostly']);
+  for (const name of ['a', 'b', 'c', 'd', 'e']) {
+    click(inputs(name)[2]);
+  }
+  type('slider', '30');
+  goOn();
+  assert.deepEqual(told[0].answers, { a: 3, b: 3, slider: 30, c: 3, d: 3, e: 3 });
+});

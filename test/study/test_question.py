@@ -13,12 +13,13 @@ import pytest
 QUESTIONS = tuple(read(Question, values, 'file') for values in (
     {'name': 'likert', 'likert': {'points': 5}},
     {'name': 'slider', 'slider': {'low': -1, 'high': 1, 'step': 0.1}},
+    {'name': 'line', 'vas': {'left': 'none', 'right': 'most'}},
     {'name': 'one', 'choice': {'choices': {'a': 'A', 'b': {'en': 'B', 'de': 'Bb'}}}},
     {'name': 'many', 'choice': {'choices': {'a': 'A', 'b': 'B'}, 'several': True},
      'required': False},
     {'name': 'age', 'number': {'low': 18, 'high': 99, 'whole': True}},
     {'name': 'free', 'text': {}, 'required': False}))
-GOOD = {'likert': 5, 'slider': 0.3, 'one': 'b', 'many': ['b', 'a'], 'age': 40,
+GOOD = {'likert': 5, 'slider': 0.3, 'line': 62.5, 'one': 'b', 'many': ['b', 'a'], 'age': 40,
         'free': '<b>"it\'s"</b>,\n;=1+1\t😀' + 'x' * 9_000}
 
 
@@ -26,12 +27,13 @@ def test_answers_stay_as_they_were() -> None:
     assert check_answers(QUESTIONS, GOOD, 'answers') == GOOD
     assert check_answers(QUESTIONS, GOOD | {'free': '', 'many': []}, 'answers')['free'] == ''
     assert check_answers(QUESTIONS, {name: GOOD[name] for name in (
-        'likert', 'slider', 'one', 'age')}, 'answers')['many'] is None
+        'likert', 'slider', 'line', 'one', 'age')}, 'answers')['many'] is None
 
 
 @pytest.mark.parametrize(('name', 'answer'), [
     ('likert', 0), ('likert', 6), ('likert', 2.5), ('likert', '3'), ('likert', True),
     ('likert', float('nan')), ('slider', 1.1), ('slider', float('inf')), ('slider', None),
+    ('line', -0.5), ('line', 100.5), ('line', '50'),
     ('one', 'c'), ('one', ['a']), ('one', None), ('many', ['a', 'a']), ('many', 'a'),
     ('many', [1]), ('age', 17), ('age', 20.5), ('age', 'x'), ('free', 'x' * 10_001),
     ('free', 7), ('nobody', 1)])

@@ -12,7 +12,13 @@ from typing import Any
 
 from crgame_ros.analysis.tables.column import Column, FLAG, INTEGER, NUMBER, TableDeclaration, TEXT
 from crgame_ros.analysis.tables.writer import NOT_A_NUMBER
-from crgame_ros.study.question import LikertQuestion, NumberQuestion, Question, SliderQuestion
+from crgame_ros.study.question import (
+    LikertQuestion,
+    NumberQuestion,
+    Question,
+    SliderQuestion,
+    VasQuestion,
+)
 from crgame_ros.study.questionnaire import Questionnaire
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -61,9 +67,9 @@ def question_column(question: Question, name: str, language: str) -> Column:
     if isinstance(kind, LikertQuestion):
         return Column(name, INTEGER, '1', says, variant=f'1 (left) to {kind.points} (right)',
                       empty=_ASKED)
-    if isinstance(kind, SliderQuestion):
-        return Column(name, NUMBER, '1', says, variant=f'{kind.low:g} to {kind.high:g}',
-                      empty=_ASKED)
+    if isinstance(kind, SliderQuestion | VasQuestion):
+        low, high = kind.bounds
+        return Column(name, NUMBER, '1', says, variant=f'{low:g} to {high:g}', empty=_ASKED)
     if isinstance(kind, NumberQuestion):
         return Column(name, INTEGER if kind.whole else NUMBER, kind.unit.in_language(language),
                       says, empty=_ASKED)

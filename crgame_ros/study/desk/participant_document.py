@@ -19,6 +19,7 @@ from crgame_ros.study.question import (
     Question,
     SliderQuestion,
     TextQuestion,
+    VasQuestion,
 )
 from crgame_ros.study.questionnaire import load_questionnaire
 from crgame_ros.study.session_journal import SessionEvent
@@ -27,6 +28,8 @@ from crgame_ros.study.trial_plan import PlannedTrial
 
 MOST_ENTRIES = 300
 LONGEST = 300
+# Between neighbouring positions on a visual analogue scale.
+VAS_STEP = 0.5
 
 
 def participant_document(desk: Desk) -> dict[str, object]:
@@ -89,12 +92,12 @@ def _item(desk: Desk, item: SessionItem) -> dict[str, Any]:
                 'left_s': round(desk.break_left_s, 1)}
     if isinstance(what, DeviceCheck):
         return {'show': 'device', 'text': what.text.in_language(language)}
-    questions = {'show': 'questions', 'title': '', 'text': '', 'questions': [
+    questions = {'show': 'questions', 'title': '', 'text': '', 'matrix': False, 'questions': [
         _question(question, language) for question in desk.session.questions(item)]}
     if isinstance(what, Questions):
         scale = load_questionnaire(questionnaire_name(study, what))
         questions |= {'title': scale.title.in_language(language),
-                      'text': scale.text.in_language(language)}
+                      'text': scale.text.in_language(language), 'matrix': scale.matrix}
     assert isinstance(what, Questions | Fields)
     return questions
 
@@ -138,6 +141,12 @@ def _question(question: Question, language: str) -> dict[str, object]:
     if isinstance(kind, SliderQuestion):
         return document | {
             'kind': 'slider', 'low': kind.low, 'high': kind.high, 'step': kind.step,
+            'bare': False, 'left': kind.left.in_language(language),
+            'right': kind.right.in_language(language)}
+    if isinstance(kind, VasQuestion):
+        low, high = kind.bounds
+        return document | {
+            'kind': 'slider', 'low': low, 'high': high, 'step': VAS_STEP, 'bare': True,
             'left': kind.left.in_language(language), 'right': kind.right.in_language(language)}
     if isinstance(kind, ChoiceQuestion):
         return document | {'kind': 'choice', 'several': kind.several, 'choices': [

@@ -18,6 +18,7 @@ export interface SliderQuestion extends Asked {
   low: number;
   high: number;
   step: number;
+  bare: boolean; // a line without ticks, and a thin mark
   left: string;
   right: string;
 }
@@ -64,6 +65,7 @@ export interface QuestionsDocument extends Always {
   show: 'questions';
   title: string;
   text: string;
+  matrix: boolean; // whether successive questions with the same points are one table
   questions: Question[];
 }
 

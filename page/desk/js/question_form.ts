@@ -3,9 +3,9 @@
 /** Questions that are answered together, with their drafts and errors. */
 
 import { element, setText } from '../../cockpit/js/dom.js';
-import { QuestionView } from './question_view.js';
+import { hasLongLabels, QuestionView } from './question_view.js';
 
-import type { QuestionsDocument, Told } from './desk_messages.js';
+import type { LikertQuestion, Question, QuestionsDocument, Told } from './desk_messages.js';
 import type { Draft } from './draft.js';
 import type { Words } from './words.js';
 
@@ -42,7 +42,43 @@ export function questionForm(shown: QuestionsDocument, words: Words, draft: Draf
   return element('form', { class: 'questions', novalidate: true, on: { submit } },
     shown.title ? element('h2', { text: shown.title }) : null,
     shown.text ? element('p', { class: 'lead', text: shown.text }) : null,
-    ...views.map(({ node }) => node), summary,
+    ...(shown.matrix ? rowsOf(shown.questions, views) : views.map(({ node }) => node)), summary,
     element('div', { class: 'go-on' },
       element('button', { type: 'submit', class: 'primary', text: words.of('next') })));
+}
+
+/** Return the questions, successive ones with the same points together as a table. */
+function rowsOf(questions: Question[], views: QuestionView[]): HTMLElement[] {
+  const nodes: HTMLElement[] = [];
+  let scale = '';
+  questions.forEach((question, i) => {
+    const own = scaleOf(question);
+    if (own !== '' && own === scale) {
+      nodes[nodes.length - 1].append(views[i].node);
+    } else if (question.kind === 'likert' && own !== '') {
+      const matrix = element('div', { class: 'matrix' }, headOf(question), views[i].node);
+      matrix.style.setProperty('--points', String(question.points));
+      nodes.push(matrix);
+    } else {
+      nodes.push(views[i].node);
+    }
+    scale = own;
+  });
+  return nodes;
+}
+
+/** @returns the same for questions that fit into one table, empty for one that fits into none */
+function scaleOf(question: Question) {
+  if (question.kind !== 'likert' || hasLongLabels(question.labels)) {
+    return '';
+  }
+  const { points, left, right, labels } = question;
+  return JSON.stringify([points, left, right, labels]);
+}
+
+/** The labels above the columns, which each row has in words that only screen readers get. */
+function headOf({ left, right, labels }: LikertQuestion) {
+  const texts = labels.length > 0 ? labels : [left, right];
+  return element('div', { class: labels.length > 0 ? 'matrix-head' : 'matrix-head ends',
+    'aria-hidden': 'true' }, ...texts.map((text) => element('span', { text })));
 }

@@ -19,6 +19,9 @@ export interface Controls {
   inputs: HTMLElement[]; // that take the focus
 }
 
+// Labels of more characters are put below each other.
+const LONG_LABEL = 24;
+
 let numbers = 0;
 
 /** One question with its text and its error. */
@@ -118,8 +121,9 @@ function likert({ points, left, right, labels }: LikertQuestion, id: string,
   const labelled = labels.length > 0;
   const places = Array.from({ length: points }, (_, i) => option(
     'radio', id, `${i + 1}`, labels[i] ?? `${i + 1}`, changed));
-  const row = element('div', { class: labelled ? 'options likert-labelled' : 'options likert',
-    'data-points': points }, ...places.map(({ node }) => node));
+  const row = element('div', { class: hasLongLabels(labels) ? 'options choices'
+    : labelled ? 'options likert-labelled' : 'options likert',
+  'data-points': points }, ...places.map(({ node }) => node));
   const ends = element('div', { class: 'ends' }, element('span', { text: left }),
     element('span', { text: right }));
   return {
@@ -134,6 +138,11 @@ function likert({ points, left, right, labels }: LikertQuestion, id: string,
     }),
     refusal: () => '',
   };
+}
+
+/** @returns whether labels need a line each */
+export function hasLongLabels(labels: string[]) {
+  return labels.some((label) => label.length > LONG_LABEL);
 }
 
 function choice({ several, choices }: ChoiceQuestion, words: Words, id: string,

@@ -13,10 +13,10 @@ import type { Words } from './words.js';
  *
  * @param id of its input
  */
-export function sliderControls({ low, high, step, left, right }: SliderQuestion, words: Words,
-  id: string, changed: () => void): Controls {
+export function sliderControls({ low, high, step, bare, left, right }: SliderQuestion,
+  words: Words, id: string, changed: () => void): Controls {
   const input = element('input', { id, type: 'range', min: low, max: high, step,
-    class: 'slider' });
+    class: bare ? 'slider bare' : 'slider' });
   let marked = false;
   const show = () => {
     setAttribute(input, 'data-unset', !marked);
@@ -45,7 +45,7 @@ export function sliderControls({ low, high, step, left, right }: SliderQuestion,
   input.value = String((low + high) / 2);
   show();
   const count = Math.round((high - low) / step);
-  const ticks = count <= 40
+  const ticks = !bare && count <= 40
     ? element('div', { class: 'ticks', 'aria-hidden': 'true' },
       ...Array.from({ length: count + 1 }, () => element('i'))) : null;
   return {
