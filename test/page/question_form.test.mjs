@@ -292,7 +292,7 @@ test('successive questions on one scale are rows of a table, and answered as any
     [...node.querySelectorAll('.question')].map(({ dataset }) => dataset.name));
   assert.deepEqual(tables, [['a', 'b'], ['c'], ['d', 'e']]);
   assert.deepEqual([...root.querySelectorAll('.matrix-head')].map(textOf),
-    ['neveralways', 'neveralways', 'nevermostly']);
+    ['never always', 'never always', 'never mostly']);
   for (const name of ['a', 'b', 'c', 'd', 'e']) {
     click(inputs(name)[2]);
   }
