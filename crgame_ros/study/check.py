@@ -71,12 +71,16 @@ def check_study(study: StudyFile,
     """
     found = [*_steps(study), *_balance(study)]
     drives = list(drives_of(study))
+    tasks: set[str] = set()
     for number, (name, settings) in enumerate(drives):
         try:
-            _try(settings)
+            tasks |= _try(settings)
         except CrgameError as error:
             found.append(StudyFinding('error', f'{name}: {error}'))
         progress((number + 1) / len(drives))
+    unknown = {name for _, settings in drives for name in settings.labels or {}} - tasks
+    found += [StudyFinding('warning', f'labels: {name}: no drive has this task')
+              for name in sorted(unknown)]
     return found
 
 
@@ -117,8 +121,8 @@ def _duration_s(settings: TrialSettings) -> float:
     return duration_s if duration_s < float('inf') else 0.0
 
 
-def _try(settings: TrialSettings) -> None:
-    """Simulate the start of a trial without a driver."""
+def _try(settings: TrialSettings) -> set[str]:
+    """Simulate the start of a trial without a driver; return the names of its tasks."""
     game = trial_game(settings, 'idle')
     # Read it as the run will, so that the combination of several files is checked.
     game = parse_game(yaml.safe_load(game.dump()), 'game of the trial', game.base)
@@ -127,6 +131,7 @@ def _try(settings: TrialSettings) -> None:
     run_offline(build_setup(game), duration_s=min(TRIED_S, game.duration))
     if game.duration == float('inf'):
         raise CrgameError('has no end: give "duration" to the game or to the study')
+    return {task.name for task in game.tasks}
 
 
 def _steps(study: StudyFile) -> Iterator[StudyFinding]:

@@ -12,6 +12,7 @@ from crgame_ros.game.instruments_spec import InstrumentsSpec
 from crgame_ros.game.task_spec import TaskList, TaskSpec
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Named, Within, Wording
+from crgame_ros.study.local_text import LocalText
 from crgame_ros.study.names import ColumnName, Name
 
 _SEE = 'see docs/studies.md for the keys'
@@ -43,6 +44,8 @@ class TrialSettings:
     :param events: added to those of the game.
     :param tasks: besides driving, added to those of the game; a task replaces an outer one of the
         same name.
+    :param labels: texts of tasks that the participant reads instead of their `label`, by the
+        task's name: one text, or one for each language.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -65,14 +68,27 @@ class TrialSettings:
     instruments: InstrumentsSpec | None = None
     events: EventList = ()
     tasks: TaskList = ()
+    labels: dict[str, object] | None = None
+
+    def check(self) -> None:
+        """Refuse labels that are no texts."""
+        for name in self.labels or {}:
+            self.label_of(name, '')
+
+    def label_of(self, task: str, language: str) -> str:
+        """Return the label of a task in a language."""
+        return LocalText.from_value((self.labels or {})[task],
+                                    f'labels: {task}').in_language(language)
 
     def over(self, outer: 'TrialSettings') -> 'TrialSettings':
-        """Return the outer settings overridden by these; events and tasks of both count."""
+        """Return the outer settings overridden by these; lists and labels of both count."""
         given = {item.name: value for item in fields(self) if item.name not in ('events', 'tasks')
                  and (value := getattr(self, item.name)) is not None}
         # Options belong to one planner; another planner does not inherit them.
         if 'planner' in given and 'options' not in given:
             given['options'] = None
+        if self.labels is not None:
+            given['labels'] = {**(outer.labels or {}), **self.labels}
         return replace(outer, **given, events=(*outer.events, *self.events),
                        tasks=tasks_over(outer.tasks, self.tasks))
 

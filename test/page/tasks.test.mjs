@@ -8,7 +8,7 @@ import { test } from 'node:test';
 import { answeredBy, isTaken, keyName } from '../../page/cockpit/js/tasks/answers.js';
 import { Prompt } from '../../page/cockpit/js/tasks/prompt.js';
 import { RunningTime } from '../../page/cockpit/js/tasks/running_time.js';
-import { languageOf, wordsIn } from '../../page/cockpit/js/tasks/task_words.js';
+import { labelsOf, languageOf, wordsIn } from '../../page/cockpit/js/tasks/task_words.js';
 
 /** @import { GameTask } from '../../page/cockpit/js/tasks/task_messages.js' */
 
@@ -96,4 +96,12 @@ test('the language is that of the address, else of the game, else English', () =
   assert.equal(languageOf('?lang=xx', 'de'), 'de');
   assert.equal(languageOf('', 'fr'), 'en');
   assert.deepEqual(Object.keys(wordsIn('de')), Object.keys(wordsIn('en')));
+});
+
+test('the address has labels of tasks in the language of the driver, or none', () => {
+  const query = `?labels=${encodeURIComponent(JSON.stringify({ radio: 'Radio – <b>', odd: 7 }))}`;
+  assert.deepEqual([...labelsOf(query)], [['radio', 'Radio – <b>']]);
+  for (const other of ['', '?labels=', '?labels=nonsense', '?labels=null', '?labels=7']) {
+    assert.equal(labelsOf(other).size, 0, other);
+  }
 });

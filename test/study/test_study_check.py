@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mistakes of a study are found before a session begins."""
 
+import json
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
@@ -11,7 +13,9 @@ from crgame_ros.game.task_spec import answer_key
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.schema.reading import read
 from crgame_ros.study.check import check_study, length_of
+from crgame_ros.study.conduct.study_drive import StudyDrive
 from crgame_ros.study.file import load_study, StudyFile
+from crgame_ros.study.session_script import drives_of, session_of
 from crgame_ros.study.trial_game import trial_game
 from crgame_ros.study.trial_plan import conditions_of, plan_trials
 import pytest
@@ -67,6 +71,23 @@ def test_settings_cascade(tmp_path: Path) -> None:
     assert game.avs is not None and {(spec.planner, spec.options['v0']) for spec in game.avs} == {
         ('idm', 9.0)}
     assert (game.duration, game.seed, game.humans[0].driver) == (1.0, 4, 'idle')
+
+
+def test_labels_of_tasks_know_languages(tmp_path: Path) -> None:
+    radio = {'name': 'radio', 'secondary_task': {'show': True}}
+    study = study_of(
+        tmp_path, blocks=[{'name': 'main', 'settings': {'labels': {'other': 'x'}}}],
+        settings={'game': CUT_IN, 'duration': 2, 'tasks': [radio],
+                  'labels': {'radio': {'en': 'Find a station', 'de': 'Sender suchen'}}})
+    _, settings = next(drives_of(study))
+    assert [settings.label_of('radio', language) for language in ('en', 'de', 'fr')] == [
+        'Find a station', 'Sender suchen', 'Find a station']
+    drive = StudyDrive(session_of(study, 0)[0], settings, 'hv0', tmp_path)
+    query = parse_qs(urlsplit(drive.link('http://127.0.0.1:1', 'de', 'k')).query)
+    assert json.loads(query['labels'][0]) == {'radio': 'Sender suchen', 'other': 'x'}
+    assert 'labels: other: no drive has this task' in told(study)
+    with pytest.raises(InputError, match='labels: radio'):
+        study_of(tmp_path, settings={'labels': {'radio': 7}})
 
 
 def test_tasks_are_for_the_seat_of_the_participant(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import json
 from pathlib import Path
 import time
 from typing import Any
@@ -140,10 +141,12 @@ class StudyDrive:
         settings = self.settings
         shown = {name: int(bool(getattr(settings, name)))
                  for name in ('map', 'names', 'plans', 'sound')}
+        labels = {name: settings.label_of(name, language) for name in settings.labels or {}}
+        told = {'labels': json.dumps(labels, ensure_ascii=False)} if labels else {}
         return f'{cockpit.rstrip("/")}/?' + urlencode(
             {'stage': self.seat, 'view': settings.view or 'driver', **shown,
              **({} if settings.photodiode is None else {'corner': settings.photodiode}),
-             'lang': language, 'key': key})
+             'lang': language, **told, 'key': key})
 
     def watch_link(self, cockpit: str) -> str:
         """Return the address of a page that only shows the drive."""

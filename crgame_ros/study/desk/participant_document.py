@@ -167,7 +167,7 @@ def experimenter_document(desk: Desk, page: Mapping[str, object]) -> dict[str, o
     session, state = desk.session, desk.drives.state
     item = session.next_item
     return {
-        'study': session.study.title.in_language('en') or session.study.name,
+        'study': session.study.title.in_language(session.study.language) or session.study.name,
         'name': session.study.name, 'participant': session.participant, 'place': session.place,
         'language': session.language, 'page': dict(page), 'markers': list(session.study.markers),
         'item': '' if item is None else item.id, 'held': session.held_at is not None,

@@ -30,6 +30,21 @@ export function languageOf(search: string, ofGame: string | undefined): Language
     .find((code) => code !== undefined) ?? 'en';
 }
 
+/**
+ * Read the labels of tasks in a page's address, in the driver's language.
+ *
+ * @param search query of the address, whose `labels` may be JSON of texts by the task's name
+ */
+export function labelsOf(search: string): Map<string, string> {
+  try {
+    const given: unknown = JSON.parse(new URLSearchParams(search).get('labels') ?? '{}');
+    return new Map(Object.entries(given ?? {}).filter(
+      (entry): entry is [string, string] => typeof entry[1] === 'string'));
+  } catch {
+    return new Map();
+  }
+}
+
 export function wordsIn(language: Language): Words {
   return WORDS[language];
 }

@@ -6,7 +6,7 @@ import { Answers, keyName } from './answers.js';
 import { inPicture, Prompt } from './prompt.js';
 import { RequestTone } from './request_tone.js';
 import { RunningTime } from './running_time.js';
-import { languageOf, wordsIn } from './task_words.js';
+import { labelsOf, languageOf, wordsIn } from './task_words.js';
 import { TaskView } from './task_view.js';
 
 import type { Connection } from '../connection.js';
@@ -25,6 +25,7 @@ export class Tasks {
   /** The open prompts of this page, by task and number. */
   #prompts = new Map<string, Prompt>();
   #words = wordsIn('en');
+  #labels = labelsOf(window.location.search);
   #frameRequested = false;
 
   constructor(stage: HTMLElement, store: Store, connection: Connection) {
@@ -187,7 +188,7 @@ export class Tasks {
     const shown = this.#store.connected ? mine.filter(({ name, kind, show }) => show
       && kind === 'secondary_task' && running.includes(name)) : [];
     this.#view.showNote(shown.map(({ name, label }) => `${this.#words.secondary}: `
-      + `${label || name}`).join(' · '));
+      + `${this.#labels.get(name) ?? (label || name)}`).join(' · '));
     this.#view.answerButton.hidden = this.#detecting === undefined;
   }
 
@@ -224,7 +225,7 @@ export class Tasks {
     }
     const { task } = request.prompt;
     this.#view.showRequest({
-      label: task.label, free: request.free,
+      label: this.#labels.get(task.name) ?? task.label, free: request.free,
       hint: request.free ? this.#words.takeOverHint.replace('{key}', keyName(task.key ?? ''))
         : this.#words.hold,
     });
