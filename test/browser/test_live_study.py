@@ -155,7 +155,7 @@ def test_a_drive_says_whether_its_data_hold(conducted: StudySession) -> None:
         assert int(row['stimuli']) >= least
         assert (row['unseen_stimuli'], row['away_s'], row['device_changes']) == ('0', '0.0', '0')
         assert float(row['view_rate_hz']) > 0.0
-        assert row['page_flag'] == ('true' if row['page_reason'] else 'false')
+        assert row['page_flag'] == ('TRUE' if row['page_reason'] else 'FALSE')
 
 
 def test_a_finished_participant_is_not_asked_again(conducted: StudySession) -> None:

@@ -104,8 +104,9 @@ class ParticipantsTable:
 
 def _consent(record: ParticipantRecord) -> dict[str, object]:
     """Return the consent that was given last."""
-    given: Mapping[str, object] = next((entry['consent'] for entry in reversed(record.entries)
-                  if entry['entry'] == SessionEvent.FINISHED and entry.get('consent')), {})
+    given: Mapping[str, object] = next(
+        (entry['consent'] for entry in reversed(record.entries)
+         if entry['entry'] == SessionEvent.FINISHED and entry.get('consent')), {})
     return {f'consent_{key}': given.get(key) if isinstance(given.get(key), str) else None
             for key in ('version', 'sha256', 'language')}
 
