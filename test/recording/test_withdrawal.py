@@ -96,6 +96,20 @@ def test_an_interrupted_withdrawal_finishes(copied: Path, lines: int) -> None:
     assert polars.read_parquet(copied / 'data' / 'participants.parquet').height == 3
 
 
+def test_data_are_gone_even_if_the_tables_cannot_be_written(
+        copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The study file does not fit the journals any more, until it is put back."""
+    file = copied / 'study' / 'study.yaml'
+    usual = file.read_text('utf-8')
+    file.write_text(usual.replace('after: [{questions: ssq}]', 'after: []'), 'utf-8')
+    assert withdraw(copied) == 2
+    assert 'all data of P02 are deleted, but' in capsys.readouterr().err
+    assert traces(copied) == ['.withdrawing/P02', '.withdrawing/P02/withdrawal.json']
+    file.write_text(usual, 'utf-8')
+    assert withdraw(copied) == 0
+    assert traces(copied) == [] and (copied / 'data' / 'trials.csv').exists()
+
+
 def test_what_cannot_be_withdrawn_is_refused(copied: Path, studied: Studied,
                                              capsys: pytest.CaptureFixture[str],
                                              monkeypatch: pytest.MonkeyPatch) -> None:

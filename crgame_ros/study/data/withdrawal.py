@@ -14,7 +14,7 @@ import shutil
 
 from crgame_ros.analysis.report.command import REPORT_FILE
 from crgame_ros.analysis.tables.data_package import PACKAGE_FILE
-from crgame_ros.errors import InputError
+from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.evaluation.file_names import GRID_FILE
 from crgame_ros.recording.run_folder import PARTICIPANTS, STUDY_FILE
 from crgame_ros.study.data.conducted_study import ConductedStudy, DATA
@@ -120,9 +120,15 @@ class Withdrawal:
         with only_writer(self.root / DATA), self._closed_session():
             state = self._begin(today)
             for each in self.held():
-                say(f'deleted {each.told()}')
                 _delete(each.path)
-            self._write_anew(state.anew, say)
+                say(f'deleted {each.told()}')
+            try:
+                self._write_anew(state.anew, say)
+            except CrgameError as error:
+                raise InputError(
+                    f'all data of {self.participant} are deleted, but the tables of the others '
+                    'cannot be written anew', str(self.root), f'mend this, then give the same '
+                    f'command again: {error}') from error
             _delete(self._pending)
             if not any(self._pending.parent.iterdir()):
                 self._pending.parent.rmdir()
