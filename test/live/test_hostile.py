@@ -187,8 +187,9 @@ def test_bad_orders_and_numbers_cost_the_run_nothing(run: Run) -> None:
     sender.close()
     _whole(run, pids)
     peer.wait_until(lambda: len(peer.statuses('recorder_node: recording')) > 1, 'two reports')
-    assert {status.message for status, _ in peer.statuses('recorder_node: recording')} == {
-        'recording into bag'}
+    # On a machine that is late, the recording may go on in another part.
+    assert all(status.message.startswith('recording into bag')
+               for status, _ in peer.statuses('recorder_node: recording'))
     assert peer.call('/sim/pause').success and peer.call('/sim/start').success
 
 

@@ -19,6 +19,7 @@ from crgame_ros.study.question import (
     NumberQuestion,
     Question,
     SliderQuestion,
+    VasQuestion,
 )
 from crgame_ros.study.session_script import PracticeDrives
 from crgame_ros.study.trial_plan import PlannedTrial
@@ -89,6 +90,8 @@ def _answer(question: Question, rng: np.random.Generator) -> object:
     kind = question.kind
     if isinstance(kind, LikertQuestion):
         return int(rng.integers(1, kind.points + 1))
+    if isinstance(kind, VasQuestion):
+        return float(rng.uniform(*kind.bounds))
     if isinstance(kind, SliderQuestion):
         steps = int((kind.high - kind.low) / kind.step)
         return kind.low + kind.step * int(rng.integers(0, steps + 1))
