@@ -18,16 +18,18 @@ from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.evaluation.file_names import GRID_FILE
 from crgame_ros.recording.run_folder import PARTICIPANTS, STUDY_FILE
 from crgame_ros.study.data.conducted_study import ConductedStudy, DATA
+from crgame_ros.study.data.preregistration import PREREGISTRATION
 from crgame_ros.study.data.study_data import KEPT, read_study_data, TABLE_NAMES
 from crgame_ros.study.data.study_data_folder import (
     only_writer,
     PROVENANCE,
+    R_SCRIPT,
     RUNS,
     write_study_data,
 )
 from crgame_ros.study.data.study_report import write_study_report
 from crgame_ros.study.data.study_rerun import RERUN
-from crgame_ros.study.folder import WITHDRAWALS, WITHDRAWING
+from crgame_ros.study.folder import MADE, WITHDRAWALS, WITHDRAWING
 from crgame_ros.study.session_journal import JOURNAL, read_journal, SessionEvent
 from crgame_ros.whole_file import sync_folder, write_text
 import pyarrow as pa
@@ -173,7 +175,7 @@ class Withdrawal:
         """Yield what was made of the data of several participants, this one among them."""
         data = self.root / DATA
         names = [f'{table}.{kind}' for table in TABLE_NAMES for kind in ('csv', 'parquet')]
-        for name in (*names, PACKAGE_FILE, PROVENANCE, REPORT_FILE, RUNS, BIDS):
+        for name in (*names, PACKAGE_FILE, PROVENANCE, REPORT_FILE, R_SCRIPT, RUNS, BIDS):
             if (data / name).exists():
                 yield data / name
         for entry in sorted((data / KEPT).iterdir()) if (data / KEPT).is_dir() else ():
@@ -216,9 +218,11 @@ class Withdrawal:
     def _foreign(self) -> list[Path]:
         """Return what somebody else has put into the folders of the study and its data."""
         data = self.root / DATA
-        known = {STUDY_FILE.parts[0], PARTICIPANTS, DATA, WITHDRAWALS, WITHDRAWING}
+        known = {STUDY_FILE.parts[0], PARTICIPANTS, DATA, WITHDRAWALS, WITHDRAWING, MADE,
+                 PREREGISTRATION}
         names = {f'{table}.{kind}' for table in TABLE_NAMES for kind in ('csv', 'parquet')}
-        names |= {PACKAGE_FILE, PROVENANCE, REPORT_FILE, RUNS, BIDS, RERUN, KEPT, '.lock'}
+        names |= {PACKAGE_FILE, PROVENANCE, REPORT_FILE, R_SCRIPT, RUNS, BIDS, RERUN, KEPT,
+                  '.lock'}
         return [*(path for path in sorted(self.root.iterdir()) if path.name not in known),
                 *(path for path in sorted(data.iterdir()) if path.name not in names)]
 
