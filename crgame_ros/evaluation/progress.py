@@ -21,14 +21,15 @@ class EvaluationProgress:
     """
     The display of an evaluation's progress.
 
-    :param stream: stream to write to.
+    :param stream: stream to write to; stderr by default.
     :param clock: returns the time [s].
     """
 
-    def __init__(self, stream: TextIO = sys.stderr,
+    def __init__(self, stream: TextIO | None = None,
                  clock: Callable[[], float] = time.monotonic) -> None:
-        self._stream, self._clock = stream, clock
-        self._bar = stream.isatty()
+        # Not as a default argument: what stderr is may change after the import.
+        self._stream, self._clock = stream or sys.stderr, clock
+        self._bar = self._stream.isatty()
         self._begin_s: float | None = None
         self._told_s = 0.0
         self._failures = 0

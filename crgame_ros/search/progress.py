@@ -20,14 +20,14 @@ class SearchProgress:
     The display of a search's progress.
 
     :param budget: number of runs.
-    :param stream: stream to write to.
+    :param stream: stream to write to; stderr by default.
     :param clock: returns the time [s].
     """
 
-    def __init__(self, budget: int, stream: TextIO = sys.stderr,
+    def __init__(self, budget: int, stream: TextIO | None = None,
                  clock: Callable[[], float] = time.monotonic) -> None:
-        self._budget, self._stream, self._clock = budget, stream, clock
-        self._bar = stream.isatty()
+        self._budget, self._stream, self._clock = budget, stream or sys.stderr, clock
+        self._bar = self._stream.isatty()
         self._done = self._new = self._failures = self._excused = self._unknown = 0
         self._begin_s: float | None = None
         self._told_s = clock()
