@@ -3,6 +3,7 @@
 """Writing and reading the values of a status, which ROS's diagnostics carry as text."""
 
 from collections.abc import Mapping
+import math
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -28,6 +29,15 @@ def printable(text: str) -> str:
 def status_truth(values: Mapping[str, str], key: str, default: bool = False) -> bool:
     """Return a boolean value; recordings of earlier versions have `True`."""
     return values[key].lower() == 'true' if key in values else default
+
+
+def status_amount(values: Mapping[str, str], key: str) -> float | None:
+    """Return a number that is not negative; None if there is none, whoever sent it."""
+    try:
+        number = float(values.get(key, ''))
+    except ValueError:
+        return None
+    return number if math.isfinite(number) and number >= 0.0 else None
 
 
 class Status(NamedTuple):

@@ -8,7 +8,7 @@ import re
 import statistics
 from typing import Any, NamedTuple
 
-from crgame_ros.messages.status_values import Status, status_truth
+from crgame_ros.messages.status_values import Status, status_amount, status_truth
 
 _SOUND_NAME = re.compile(r'cockpit_node: ((?:hv|av)[0-9]{1,3}) sound')
 
@@ -86,10 +86,11 @@ class ViewPeriods:
             return
         choice = {
             'shown': values['shown'], **{key: status_truth(values, key) for key in _FLAGS},
-            **{key: _number(values, key) for key in _MEASURES},
+            **{key: status_amount(values, key) for key in _MEASURES},
             'renderer': values.get('renderer', '')}
         self._told.setdefault(found[1], []).append(
-            _Told(time_s, choice, _number(values, 'ratio'), _number(values, 'rate_hz')))
+            _Told(time_s, choice, status_amount(values, 'ratio'),
+                  status_amount(values, 'rate_hz')))
 
     def as_dict(self) -> dict[str, list[dict[str, Any]]]:
         """
@@ -117,11 +118,3 @@ def _periods(told: list[_Told]) -> Iterable[dict[str, object]]:
 def _median(values: Iterable[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return round(statistics.median(known), 3) if known else None
-
-
-def _number(values: Mapping[str, str], key: str) -> float | None:
-    try:
-        number = float(values.get(key, ''))
-    except ValueError:
-        return None
-    return number if math.isfinite(number) and number >= 0.0 else None

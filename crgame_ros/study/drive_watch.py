@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import statistics
 
 from crgame_ros.game.task_documents import TaskEntry
-from crgame_ros.messages.status_values import Status, status_truth
+from crgame_ros.messages.status_values import Status, status_amount, status_truth
 
 # Statuses come every second, and at each change; one that fails to come tells nothing [s].
 _LONGEST_S = 1.5
@@ -42,8 +42,10 @@ class DriveWatch:
         values = status.values
         if status.name != self._name or not values.get('shown') or time_s <= 0.0:
             return
-        if values.get('rate_hz'):
-            self._rates_hz.append(float(values['rate_hz']))
+        # Another program may send such a status: what is no number is left out.
+        rate_hz = status_amount(values, 'rate_hz')
+        if rate_hz is not None:
+            self._rates_hz.append(rate_hz)
         if self._before is not None:
             before_s, away, windowed = self._before
             passed_s = min(max(0.0, time_s - before_s), _LONGEST_S)

@@ -26,7 +26,7 @@ def test_times_are_between_statuses_and_a_pause_of_them_tells_nothing() -> None:
     watch = DriveWatch('av0')
     for time_s, told in (
             (0.0, view(away='focus')), (1.0, view()), (2.0, view(away='focus')), (2.6, view()),
-            (3.0, view(full_screen=False)), (3.5, view(rate_hz='10.0')),
+            (3.0, view(full_screen=False)), (3.5, view(rate_hz='10.0')), (3.5, view(rate_hz='?')),
             (4.0, view(away='hidden', device='')), (60.0, view(device='keyboard'))):
         watch.add(told, time_s)
     watch.add(view()._replace(name='cockpit_node: hv0 view'), 61.0)
