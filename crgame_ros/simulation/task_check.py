@@ -32,7 +32,6 @@ def check_tasks(tasks: Sequence[TaskSpec], events: Sequence[EventSpec], where: s
     :raises InputError: naming the task and the available names.
     """
     by_name = {event.name: event for event in events}
-    seated = [replace(spec, seat=spec.seat or next(iter(vehicles), None)) for spec in tasks]
     for spec in tasks:
         place = f'{where}: task {spec.name}'
         if spec.name in by_name:
@@ -55,7 +54,7 @@ def check_tasks(tasks: Sequence[TaskSpec], events: Sequence[EventSpec], where: s
         if isinstance(spec.task, TakeOverPrompt) and spec.task.before is not None:
             _check_event(spec.task.before, by_name, place)
             _check_lead(spec, spec.task, by_name[spec.task.before], place)
-    _check_answers(seated, where)
+    _check_answers([replace(spec, seat=task_seat(spec, vehicles)) for spec in tasks], where)
 
 
 def _check_answers(tasks: Sequence[TaskSpec], where: str) -> None:

@@ -8,7 +8,15 @@ import math
 from crgame_ros.analysis.behaviour.gaps_accepted import Neighbour
 from crgame_ros.analysis.behaviour.measures import MEASURES
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TableDeclaration, TEXT
+from crgame_ros.analysis.tables.column import (
+    Column,
+    INTEGER,
+    known,
+    NUMBER,
+    RUN,
+    TableDeclaration,
+    TEXT,
+)
 from crgame_ros.analysis.tables.part import TablePart
 from crgame_ros.analysis.tables.writer import TableRows
 
@@ -27,12 +35,8 @@ def _column(name: str, empty: str) -> Column:
 def _vehicles(run: Run) -> Mapping[str, Sequence[object]]:
     found = run.usual_behaviour
     return {'driven_s': [each.driven_s for each in found],
-            **{f'drive_{name}': [_known(each.values.get(name, math.nan)) for each in found]
+            **{f'drive_{name}': [known(each.values.get(name, math.nan)) for each in found]
                for name in _PER_VEHICLE}}
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value
 
 
 VEHICLE_BEHAVIOUR = TablePart((
@@ -90,16 +94,16 @@ def _reactions(run: Run) -> Iterable[Mapping[str, object]]:
         for each in driver.reactions:
             yield {'run': run.id, 'vehicle': driver.vehicle_id, 'event': each.event,
                    'time_s': each.event_s,
-                   'reaction_throttle': _known(each.reaction.throttle_s),
-                   'reaction_brake': _known(each.reaction.brake_s),
-                   'reaction_steering': _known(each.reaction.steering_s)}
+                   'reaction_throttle': known(each.reaction.throttle_s),
+                   'reaction_brake': known(each.reaction.brake_s),
+                   'reaction_steering': known(each.reaction.steering_s)}
 
 
 def _lane_changes(run: Run) -> Iterable[Mapping[str, object]]:
     for driver in run.usual_behaviour:
         for number, change in enumerate(driver.lane_changes):
             yield {'run': run.id, 'vehicle': driver.vehicle_id, 'number': number,
-                   'time_s': _known(change.time_s), 'side': change.side,
+                   'time_s': known(change.time_s), 'side': change.side,
                    **_neighbour('leader', change.leader, change.gap.leader),
                    **_neighbour('follower', change.follower, change.gap.follower)}
 
@@ -116,6 +120,6 @@ def _take_over_rows(run: Run) -> Iterable[Mapping[str, object]]:
                    'end_s': each.end_s,
                    'request': None if each.request is None else each.request.by,
                    'request_s': None if each.request is None else each.request.time_s,
-                   'hands_on_s': _known(each.hands_on_s), 'stable_s': _known(each.stable_s),
-                   'take_over_hands_on': _known(each.to_hands_on_s),
-                   'take_over_stable': _known(each.to_stable_s)}
+                   'hands_on_s': known(each.hands_on_s), 'stable_s': known(each.stable_s),
+                   'take_over_hands_on': known(each.to_hands_on_s),
+                   'take_over_stable': known(each.to_stable_s)}

@@ -5,6 +5,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 import json
+import math
 
 import pyarrow as pa
 
@@ -96,3 +97,8 @@ def step_columns(of: str) -> tuple[Column, Column]:
     return (Column('k', INTEGER, '1', f'scenario time step of {of}'),
             Column('time_s', NUMBER, 's', f"time of {of} since the run's start",
                    variant='simulated time, (k - k0) times the scenario time step'))
+
+
+def known(value: float) -> float | None:
+    """Return a value of a row; None, which is missing, for NaN."""
+    return None if math.isnan(value) else value

@@ -3,13 +3,13 @@
 """The tables of tasks: stimuli and answers, scores, take-over requests, and spans."""
 
 from collections.abc import Iterable, Mapping, Sequence
-import math
 
 from crgame_ros.analysis.behaviour.task_events import detection_scores, task_events, TaskEvent
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
     Column,
     INTEGER,
+    known,
     NUMBER,
     RUN,
     step_columns,
@@ -137,7 +137,7 @@ def write_tasks(run: Run, writers: Mapping[str, TableRows]) -> None:
 def _common(event: TaskEvent) -> dict[str, object]:
     return {'task': event.name, 'vehicle': event.seat, 'number': event.value,
             'time_s': event.onset_s, 'shown_delay_ms': event.times.delay_ms,
-            'shown_time_s': _known(event.shown_s), 'shown_error_ms': event.times.clock_error_ms,
+            'shown_time_s': known(event.shown_s), 'shown_error_ms': event.times.clock_error_ms,
             'picture_ms': event.times.picture_ms, 'outcome': event.outcome}
 
 
@@ -148,16 +148,12 @@ def _responses(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:
                    'paused_ms': event.times.paused_ms}
 
 
-def _known(seconds: float) -> float | None:
-    return None if math.isnan(seconds) else seconds
-
-
 def _requests(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:
     for event in events:
         if event.what == 'request':
             yield {**_common(event), 'duration_s': event.duration_s,
-                   'first_input_s': _known(event.response_time_s),
-                   'answered_s': _known(event.answered_s)}
+                   'first_input_s': known(event.response_time_s),
+                   'answered_s': known(event.answered_s)}
 
 
 def _spans(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:
