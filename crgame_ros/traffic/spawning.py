@@ -212,10 +212,9 @@ class Spawner:
             if not len(free):
                 return
             lane = int(self.entries[number])
-            fitting = [slot for slot in free.tolist() if self._fits_into(agents, slot, lane)]
-            if not fitting:
+            slot = next((x for x in free.tolist() if self._fits_into(agents, x, lane)), None)
+            if slot is None:
                 continue
-            slot = fitting[0]
             self._character(agents, slot)
             s = 0.5 * float(agents.length[slot])
             self._choose_destination(agents, slot, lane)
@@ -235,8 +234,11 @@ class Spawner:
                others: Bodies) -> tuple[FloatArray, FloatArray]:
         """Return the gaps (A) of agents to their leaders, and the leaders' speeds (A)."""
         lanes, middle = self._graph.table, np.zeros(len(slots))
-        entries = place(lanes, self._cells.table, with_agents(others, agents.table))
         way = own_ways(lanes, self._routes.next, agents.table, slots)
+        on_ways = np.zeros(len(self._graph), dtype=bool)
+        for lane, depth in zip(way.lane, way.depth, strict=True):
+            on_ways[lane[:depth]] = True
+        entries = place(lanes, self._cells.table, with_agents(others, agents.table), on_ways)
         corridor = corridors(agents.table, slots, middle, middle)
         pairs = ahead(lanes, agents.table, entries, way, corridor, np.empty(0))
         gap, _, entry = nearest(pairs, entries, len(slots))

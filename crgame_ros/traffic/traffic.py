@@ -73,6 +73,7 @@ class Traffic:
         side, movements = driving_side(scenario), Movements(self._graph)
         self._conflicts = Conflicts(self._graph, movements, side)
         self._cells = LaneCells(self._graph)
+        self._all_lanes = np.ones(len(self._graph), dtype=bool)
         for_cars, for_trucks = find_tight_lanes(
             self._graph, *trial_shapes(network.vehicle_type, adopted))
         self._routes = Routes(
@@ -152,8 +153,7 @@ class Traffic:
         slots = np.flatnonzero(agents.active)
         if len(slots):
             self._right_of_way.lines.show(others.k, others.signals)
-            entries = place(self._graph.table, self._cells.table, with_agents(
-                bodies, agents.table))
+            entries = self._place(bodies)
             standing = self._swerve_around(entries, others)
             acceleration = self._decide(others.k, slots, bodies, entries, standing)
             self._motion.move(agents, slots, acceleration, self._following.reference,
@@ -162,6 +162,11 @@ class Traffic:
             self._leave(others, slots)
         self._adopt(others.k + 1, bodies)
         self._spawner.arrive(others.k + 1, agents, bodies)
+
+    def _place(self, bodies: Bodies) -> Entries:
+        """Find what agents and bodies take of all lanes."""
+        return place(self._graph.table, self._cells.table, with_agents(
+            bodies, self._agents.table), self._all_lanes)
 
     def _swerve_around(self, entries: Entries, others: WorldView) -> NDArray[np.bool_]:
         """Return which entries (E) stand for good, and swerve around them."""
@@ -202,7 +207,7 @@ class Traffic:
         if not newcomers:
             return
         slots = np.flatnonzero(agents.active)
-        entries = place(self._graph.table, self._cells.table, with_agents(bodies, agents.table))
+        entries = self._place(bodies)
         seen = self._following.look(agents, slots, entries)
         halts = self._halts(k, seen, entries, 0.0)
         self._spawner.slow_down(agents, slots, seen.desired, halts, newcomers)

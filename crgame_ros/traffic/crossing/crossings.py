@@ -4,7 +4,7 @@
 
 import math
 
-from crgame_ros.traffic.compiling.compiled import compiled
+from crgame_ros.traffic.compiling.compiled import bare, compiled
 from crgame_ros.traffic.crossing.exit_room import (
     has_filled,
     is_full,
@@ -90,32 +90,52 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
            agents: AgentTable, way: Ways, passage: Passages, arrivals: Arrivals,
            at: Situation) -> tuple[FloatArray, BoolArray]:
     slots, count = at.slots, len(at.slots)
-    _release(agents, slots, way, dt_s)
-    _see_junctions(rules, agents, slots, passage, dt_s)
     promised = Promises(np.zeros(len(conflicts.first)), np.zeros(len(conflicts.first)))
-    for i, slot in enumerate(slots):
-        if agents.grant[slot] >= 0:
-            promise(promised, agents, slot, way, passage.granted[i], i)
-        elif waits_inside(passage, i):
-            promise(promised, agents, slot, way, passage.last[i], i)
     stopped, full = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
-    halt = np.full(count, math.inf)
-    for i, slot in enumerate(slots):
-        # No agent is let in past another that waits before the same junction.
-        stopped[i] = _is_stopped(at, i, passage.hold[i])
-        full[i] = is_full(k, rules, promised, agents, slot, way, passage, at, i)
+    _look(rules, dt_s, k, agents, way, passage, at, promised, stopped, full)
     # Other agents leave the room behind the junction to an agent that has waited very long.
     first = full & ~stopped
     next_in = first & (agents.waits[slots] > ticks[3])
     meeting = meet(conflicts, rules, agents, way, passage, arrivals, at, stopped | full, first,
                    next_in)
+    halt = np.full(count, math.inf)
+    _decide(rules, ticks, k, agents, way, passage, meeting, at, promised,
+            _in_turn(k, agents, slots), stopped, full, halt)
+    return halt, full & ~stopped & (passage.first >= 0) & (passage.hold < AT_LINE)
+
+
+@bare
+def _look(rules: CrossingRules, dt_s: float, k: int, agents: AgentTable, way: Ways,
+          passage: Passages, at: Situation, promised: Promises, stopped: BoolArray,
+          full: BoolArray) -> None:
+    """End grants; write the room promised, and what keeps agents from entering."""
+    slots = at.slots
+    _release(agents, slots, way, dt_s)
+    _see_junctions(rules, agents, slots, passage, dt_s)
+    for i, slot in enumerate(slots):
+        if agents.grant[slot] >= 0:
+            promise(promised, agents, slot, way, passage.granted[i], i)
+        elif waits_inside(passage, i):
+            promise(promised, agents, slot, way, passage.last[i], i)
+    for i, slot in enumerate(slots):
+        # No agent is let in past another that waits before the same junction.
+        stopped[i] = _is_stopped(at, i, passage.hold[i])
+        full[i] = is_full(k, rules, promised, agents, slot, way, passage, at, i)
+
+
+@bare
+def _decide(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable, way: Ways,
+            passage: Passages, meeting: Meetings, at: Situation, promised: Promises,
+            in_turn: IntArray, stopped: BoolArray, full: BoolArray, halt: FloatArray) -> None:
+    """Withdraw grants and give new ones, in turn; write where agents (A) halt."""
+    slots = at.slots
     for i, slot in enumerate(slots):
         agents.blocker[slot] = FREE
         if agents.grant[slot] >= 0 and _withdraws(rules, ticks, k, agents, passage, meeting, at,
                                                   i):
             agents.grant[slot] = agents.before[slot] = NONE
             halt[i] = agents.grant_hold[slot]
-    for i in _in_turn(k, agents, slots):
+    for i in in_turn:
         slot = slots[i]
         if passage.first[i] < 0 or halt[i] < math.inf:
             continue
@@ -133,10 +153,9 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
                 stopped[i] or full[i] or _heeds(agents, slot)):
             halt[i] = min(halt[i], _waiting_place(ticks, k, agents, passage, meeting, at,
                                                   stopped[i] or full[i], i))
-    return halt, full & ~stopped & (passage.first >= 0) & (passage.hold < AT_LINE)
 
 
-@compiled
+@bare
 def _grant(k: int, agents: AgentTable, slot: int, way: Ways, passage: Passages, i: int) -> None:
     """Grant an agent its next junction, so that it no longer waits before it."""
     if agents.grant[slot] < 0:
@@ -151,13 +170,13 @@ def _grant(k: int, agents: AgentTable, slot: int, way: Ways, passage: Passages, 
     passage.granted[i], passage.first[i] = passage.last[i], -1
 
 
-@compiled
+@bare
 def _is_near(speed: float, hold: float) -> bool:
     """Return whether a junction is so near that an agent asks to be let in, or lets others in."""
     return hold < 10.0 + REACTION * speed + speed * speed / (2.0 * GENTLE)
 
 
-@compiled
+@bare
 def _release(agents: AgentTable, slots: IntArray, way: Ways, dt_s: float) -> None:
     """End the grants of agents that have passed their junction."""
     for i, slot in enumerate(slots):
@@ -174,13 +193,13 @@ def _release(agents: AgentTable, slots: IntArray, way: Ways, dt_s: float) -> Non
             agents.before[slot] = NONE
 
 
-@compiled
+@bare
 def _is_stopped(at: Situation, i: int, hold: float) -> bool:
     """Return whether a red light or a queue stops an agent before its hold [m], or close by."""
     return bool(min(at.light[i], at.queued[i]) < max(hold, 0.0) + 2.0)
 
 
-@compiled
+@bare
 def _see_junctions(rules: CrossingRules, agents: AgentTable, slots: IntArray, passage: Passages,
                    dt_s: float) -> None:
     """Mark when late drivers notice a junction: at the last tick at which hard braking helps."""
@@ -191,7 +210,7 @@ def _see_junctions(rules: CrossingRules, agents: AgentTable, slots: IntArray, pa
             agents.sees[slot] = True
 
 
-@compiled
+@bare
 def _heeds(agents: AgentTable, slot: int) -> bool:
     """Return whether an agent obeys the right of way: a late one does once it has noticed."""
     return bool(agents.sees[slot] or not agents.late[slot])
@@ -206,7 +225,7 @@ def _in_turn(k: int, agents: AgentTable, slots: IntArray) -> IntArray:
     return np.argsort(key, kind='mergesort')
 
 
-@compiled
+@bare
 def _withdraws(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable,
                passage: Passages, meeting: Meetings, at: Situation, i: int) -> bool:
     """Return whether an agent gives up its grant; only a late driver does so by hard braking."""
@@ -227,7 +246,7 @@ def _withdraws(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
     return False
 
 
-@compiled
+@bare
 def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable,
                passage: Passages, meeting: Meetings, at: Situation, stopped: BoolArray,
                full: BoolArray, i: int) -> bool:
@@ -256,7 +275,7 @@ def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
     return True
 
 
-@compiled
+@bare
 def _waiting_place(ticks: IntArray, k: int, agents: AgentTable, passage: Passages,
                    meeting: Meetings, at: Situation, stays: bool, i: int) -> float:
     """
@@ -277,7 +296,7 @@ def _waiting_place(ticks: IntArray, k: int, agents: AgentTable, passage: Passage
     return float(place)
 
 
-@compiled
+@bare
 def _has_mercy(ticks: IntArray, k: int, agents: AgentTable, meeting: Meetings, at: Situation,
                i: int, n: int) -> bool:
     """Return whether an agent lets another go first that has waited very long."""
@@ -289,7 +308,7 @@ def _has_mercy(ticks: IntArray, k: int, agents: AgentTable, meeting: Meetings, a
     return bool(waits > ticks[3] and waits > agents.waits[at.slots[i]])
 
 
-@compiled
+@bare
 def _yields(ticks: IntArray, k: int, agents: AgentTable, passage: Passages, meeting: Meetings,
             at: Situation, i: int, n: int) -> bool:
     """Return whether an agent lets the other of a meeting go first."""
@@ -313,7 +332,7 @@ def _yields(ticks: IntArray, k: int, agents: AgentTable, passage: Passages, meet
     return bool(meeting.priority[n] < 0 and not patient)
 
 
-@compiled
+@bare
 def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meetings,
                  at: Situation, i: int) -> float:
     """Return the distance at which an agent that was let in halts before a taken conflict."""
@@ -340,7 +359,7 @@ def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meeting
     return max(result - BEFORE, min(result, agents.speed[slot]**2 / (2.0 * FIRM)))
 
 
-@compiled
+@bare
 def _is_senior(k: int, agents: AgentTable, passage: Passages, meeting: Meetings, at: Situation,
                i: int, n: int) -> bool:
     """Return whether the other of a meeting goes before an agent, both having been let in."""
@@ -353,7 +372,7 @@ def _is_senior(k: int, agents: AgentTable, passage: Passages, meeting: Meetings,
     return bool(theirs < grant or (theirs == grant and them < slot))
 
 
-@compiled
+@bare
 def _admission_tick(agents: AgentTable, slot: int, passage: Passages, i: int, step: int) -> int:
     """Return the tick at which an agent was let into the junction at a step of its way."""
     in_first = agents.before[slot] >= 0 and step <= passage.before[i]

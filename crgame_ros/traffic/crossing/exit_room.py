@@ -5,7 +5,7 @@
 import math
 from typing import NamedTuple
 
-from crgame_ros.traffic.compiling.compiled import compiled
+from crgame_ros.traffic.compiling.compiled import bare, compiled
 from crgame_ros.traffic.crossing.junctions import Passages
 from crgame_ros.traffic.crossing.meetings import CrossingRules, Situation
 from crgame_ros.traffic.fleet.agents import AgentTable
@@ -32,8 +32,15 @@ def queues(agents: AgentTable, slots: IntArray, pairs: Pairs, entries: Entries,
     :return: `Situation.rear_stop` and `Situation.queued`
     """
     rear_stop, queued = np.full(len(slots), math.inf), np.full(len(slots), math.inf)
-    between = np.zeros(len(slots))
-    row = np.full(len(agents.x), -1, np.int64)
+    _write_queues(agents, slots, pairs, entries, passage, np.zeros(len(slots)),
+                  np.full(len(agents.x), -1, np.int64), rear_stop, queued)
+    return rear_stop, queued
+
+
+@bare
+def _write_queues(agents: AgentTable, slots: IntArray, pairs: Pairs, entries: Entries,
+                  passage: Passages, between: FloatArray, row: IntArray, rear_stop: FloatArray,
+                  queued: FloatArray) -> None:
     for i, slot in enumerate(slots):
         row[slot] = i
     for p in range(len(pairs.agent)):
@@ -47,7 +54,6 @@ def queues(agents: AgentTable, slots: IntArray, pairs: Pairs, entries: Entries,
             between[i] += entries.front[n] - entries.rear[n] + QUEUE_GAP
             if agents.grant[owner] < 0 if owner >= 0 else speed < DRIVES_ON:
                 queued[i] = min(queued[i], pairs.gap[p])
-    return rear_stop, queued
 
 
 class Promises(NamedTuple):
@@ -62,7 +68,7 @@ class Promises(NamedTuple):
     through: FloatArray
 
 
-@compiled
+@bare
 def promise(promised: Promises, agents: AgentTable, slot: int, way: Ways, step: int,
             i: int) -> None:
     """Reserve room for an agent behind the junction that ends at a step of its way."""
@@ -72,7 +78,7 @@ def promise(promised: Promises, agents: AgentTable, slot: int, way: Ways, step: 
         promised.through[way.lane[i, step]] += room
 
 
-@compiled
+@bare
 def is_full(k: int, rules: CrossingRules, promised: Promises, agents: AgentTable, slot: int,
             way: Ways, passage: Passages, at: Situation, i: int) -> bool:
     """
@@ -90,7 +96,7 @@ def is_full(k: int, rules: CrossingRules, promised: Promises, agents: AgentTable
         at.rear_stop[i] - taken < passage.end[i] + agents.length[slot] + rules.room))
 
 
-@compiled
+@bare
 def has_filled(k: int, rules: CrossingRules, agents: AgentTable, at: Situation, i: int) -> bool:
     """
     Return whether there is no room any more behind the junction that an agent was let into.

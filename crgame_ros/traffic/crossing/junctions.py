@@ -5,7 +5,7 @@
 import math
 from typing import NamedTuple
 
-from crgame_ros.traffic.compiling.compiled import compiled
+from crgame_ros.traffic.compiling.compiled import bare, compiled
 from crgame_ros.traffic.crossing.stop_lines import HELD, NO_LIGHT, OPENED
 from crgame_ros.traffic.fleet.agents import AgentTable
 from crgame_ros.traffic.following.leaders import Ways
@@ -102,6 +102,13 @@ def passages(conflicts: ConflictTable, lines: FloatArray, lights: IntArray, way:
         np.full(count, -1, np.int64), np.full(count, -1, np.int64), np.full(count, -1, np.int64),
         np.full(count, -1, np.int64), np.full(count, math.inf), np.full(count, math.inf),
         np.full(count, -math.inf), np.zeros(count, np.bool_))
+    _write_passages(conflicts, lines, lights, way, agents, slots, result)
+    return result
+
+
+@bare
+def _write_passages(conflicts: ConflictTable, lines: FloatArray, lights: IntArray, way: Ways,
+                    agents: AgentTable, slots: IntArray, result: Passages) -> None:
     for i, slot in enumerate(slots):
         wide = 1 if agents.width[slot] > NARROW else 0
         entry, leave = conflicts.entry[wide], conflicts.leave[wide]
@@ -143,10 +150,9 @@ def passages(conflicts: ConflictTable, lines: FloatArray, lights: IntArray, way:
         if result.first[i] >= 0:
             result.inside[i] = _place_inside(conflicts, lights, way, agents, slot, result, i)
             result.ring[i] = _is_in_ring(conflicts, way, result, i)
-    return result
 
 
-@compiled
+@bare
 def _is_in_ring(conflicts: ConflictTable, way: Ways, passage: Passages, i: int) -> bool:
     """Return `Passages.ring`."""
     for step in range(passage.first[i], passage.last[i] + 1):
@@ -157,7 +163,7 @@ def _is_in_ring(conflicts: ConflictTable, way: Ways, passage: Passages, i: int) 
     return True
 
 
-@compiled
+@bare
 def _place_inside(conflicts: ConflictTable, lights: IntArray, way: Ways, agents: AgentTable,
                   slot: int, passage: Passages, i: int) -> float:
     """Return `Passages.inside`: before the first conflict with a lane not held at red."""
@@ -183,19 +189,19 @@ def _place_inside(conflicts: ConflictTable, lights: IntArray, way: Ways, agents:
     return float(place if yields and (hold < STARTED or place > hold + ENTERED) else hold)
 
 
-@compiled
+@bare
 def waits_inside(passage: Passages, i: int) -> bool:
     """Return whether an agent is in a junction and waits there without having been let in."""
     return bool(passage.first[i] >= 0 and passage.hold[i] < STARTED < passage.inside[i])
 
 
-@compiled
+@bare
 def hold_before(entry: float) -> float:
     """Return the arc length on a lane at which fronts wait before its first conflict [m]."""
     return entry - 1.0 if entry > WAITING_ROOM else min(0.0, entry - 0.5)
 
 
-@compiled
+@bare
 def _hold(entry: float, lines: FloatArray, way: Ways, i: int, step: int, clear: float) -> float:
     """
     Return the distance of an agent's centre to where its front waits before a junction [m].
@@ -226,8 +232,21 @@ def arrivals(lanes: LaneTable, conflicts: ConflictTable, way: Ways, agents: Agen
     :param drives: (O) which of the others are vehicles.
     :param widths: (O) of the others [m]
     """
+    lane, start = np.empty(MAX_BRANCHES**2, np.int64), np.empty(MAX_BRANCHES**2)
     room = _room(conflicts, way, agents, slots)
-    found = _empty(0, room + 64)
+    room += _write_others(lanes, conflicts, entries, drives, widths, lane, start, _empty(0, 0), 0)
+    found = _empty(0, room)
+    used = _write_agents(lanes, conflicts, way, agents, slots, found)
+    used = _write_others(lanes, conflicts, entries, drives, widths, lane, start, found, used)
+    result = _empty(len(conflicts.lane), used)
+    _write_by_conflict(found, used, np.zeros(len(conflicts.lane), np.int64), result)
+    return result
+
+
+@bare
+def _write_agents(lanes: LaneTable, conflicts: ConflictTable, way: Ways, agents: AgentTable,
+                  slots: IntArray, found: Arrivals) -> int:
+    """Write the arrivals of agents; return how many there are."""
     used = 0
     for i, slot in enumerate(slots):
         half, factor = 0.5 * agents.length[slot], max(agents.factor[slot], 1.0)
@@ -253,14 +272,23 @@ def arrivals(lanes: LaneTable, conflicts: ConflictTable, way: Ways, agents: Agen
                         _note(found, used, i, row, offset, half, agents.speed[slot],
                               agents.width[slot], step, soonest / factor, pace * factor)
                         used += 1
+    return used
+
+
+@bare
+def _write_others(lanes: LaneTable, conflicts: ConflictTable, entries: Entries,
+                  drives: NDArray[np.bool_], widths: FloatArray, lane: IntArray,
+                  start: FloatArray, found: Arrivals, used: int) -> int:
+    """Write the arrivals of others; return how many there are with those before, room or not."""
     for n in range(len(entries.owner)):
         other = -1 - entries.owner[n]
         if other >= 0 and drives[other] and not entries.crosses[n] and entries.speed[n] > -0.5:
-            found, used = _others(lanes, conflicts, entries, n, widths[other], found, used)
-    return _by_conflict(found, used, len(conflicts.lane))
+            used = _write_other(lanes, conflicts, entries, n, widths[other], lane, start, found,
+                                used)
+    return used
 
 
-@compiled
+@bare
 def _room(conflicts: ConflictTable, way: Ways, agents: AgentTable, slots: IntArray) -> int:
     room = 0
     for i, slot in enumerate(slots):
@@ -278,7 +306,7 @@ def _empty(conflicts: int, room: int) -> Arrivals:
                     np.empty(room), np.empty(room, np.int64), np.empty(room), np.empty(room))
 
 
-@compiled
+@bare
 def _note(found: Arrivals, n: int, owner: int, conflict: int, offset: float, half: float,
           speed: float, width: float, step: int, soonest: float, pace: float) -> None:
     found.owner[n], found.conflict[n], found.step[n] = owner, conflict, step
@@ -286,14 +314,13 @@ def _note(found: Arrivals, n: int, owner: int, conflict: int, offset: float, hal
     found.soonest[n], found.pace[n] = soonest, pace
 
 
-@compiled
-def _others(lanes: LaneTable, conflicts: ConflictTable, entries: Entries, n: int, width: float,
-            found: Arrivals, used: int) -> tuple[Arrivals, int]:
-    """Add the conflicts that one of the others may come to, along all branches."""
+@bare
+def _write_other(lanes: LaneTable, conflicts: ConflictTable, entries: Entries, n: int,
+                 width: float, lane: IntArray, start: FloatArray, found: Arrivals,
+                 used: int) -> int:
+    """Write the conflicts that one of the others may come to, along all branches."""
     speed = max(entries.speed[n], 0.0)
     reach = OTHERS_REACH + OTHERS_TIME * speed
-    lane = np.full(MAX_BRANCHES**2, -1, np.int64)
-    start = np.zeros(MAX_BRANCHES**2)
     half = 0.5 * (entries.front[n] - entries.rear[n])
     lane[0], start[0] = entries.lane[n], half - entries.front[n]
     pending, done = 1, 0
@@ -303,10 +330,9 @@ def _others(lanes: LaneTable, conflicts: ConflictTable, entries: Entries, n: int
         for row in range(conflicts.first[current],
                          conflicts.first[current] + conflicts.rows[current]):
             if offset + conflicts.end[1, row] + half > 0.0:
-                if used == len(found.owner):
-                    found = _grown(found)
-                _note(found, used, entries.owner[n], row, offset, half, speed, width, 0, 0.0,
-                      math.inf)
+                if used < len(found.owner):
+                    _note(found, used, entries.owner[n], row, offset, half, speed, width, 0, 0.0,
+                          math.inf)
                 used += 1
         offset += lanes.length[current]
         if offset - half < reach:
@@ -314,36 +340,25 @@ def _others(lanes: LaneTable, conflicts: ConflictTable, entries: Entries, n: int
                 if onward >= 0 and pending < len(lane):
                     lane[pending], start[pending] = onward, offset
                     pending += 1
-    return found, used
+    return used
 
 
-@compiled
-def _grown(found: Arrivals) -> Arrivals:
-    more = _empty(0, 2 * len(found.owner))
-    for n in range(len(found.owner)):
-        _note(more, n, found.owner[n], found.conflict[n], found.offset[n], found.half[n],
-              found.speed[n], found.width[n], found.step[n], found.soonest[n], found.pace[n])
-    return more
-
-
-@compiled
-def _by_conflict(found: Arrivals, used: int, conflicts: int) -> Arrivals:
-    """Return arrivals sorted by conflict; those of one conflict keep their order."""
-    result = _empty(conflicts, used)
+@bare
+def _write_by_conflict(found: Arrivals, used: int, fill: IntArray, result: Arrivals) -> None:
+    """Write arrivals sorted by conflict; those of one conflict keep their order."""
     for n in range(used):
         result.begin[found.conflict[n] + 1] += 1
-    for row in range(conflicts):
+    for row in range(len(fill)):
+        fill[row] = result.begin[row]
         result.begin[row + 1] += result.begin[row]
-    fill = result.begin.copy()
     for n in range(used):
         row = found.conflict[n]
         _note(result, fill[row], found.owner[n], row, found.offset[n], found.half[n],
               found.speed[n], found.width[n], found.step[n], found.soonest[n], found.pace[n])
         fill[row] += 1
-    return result
 
 
-@compiled
+@bare
 def time_to(distance: float, speed: float, acceleration: float, top: float) -> float:
     """Return the time to cover a distance when accelerating up to a top speed [s]; 0 if behind."""
     distance, top = max(distance, 0.0), max(top, speed, 0.5)

@@ -5,7 +5,7 @@
 import math
 from typing import NamedTuple
 
-from crgame_ros.traffic.compiling.compiled import compiled, inlined
+from crgame_ros.traffic.compiling.compiled import bare, compiled, inlined
 from crgame_ros.traffic.crossing.junctions import Arrivals, FIRM, Passages, time_to, waits_inside
 from crgame_ros.traffic.fleet.agents import AgentTable
 from crgame_ros.traffic.following.leaders import Ways
@@ -136,13 +136,26 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
     :param next_in: (A) whether the next free room behind a full junction is its own: no other
         agent takes it.
     """
-    room = 64
-    found = _empty(len(at.slots), room)
+    begin, row = _rows_of(arrivals, len(at.slots))
+    room = 64 + 2 * len(arrivals.owner)
+    while True:
+        found = _empty(len(at.slots), room)
+        room = _pair(conflicts, rules, agents, way, passage, arrivals, at, stays, first, next_in,
+                     begin, row, found)
+        if room <= len(found.other):
+            return found
+
+
+@bare
+def _pair(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way: Ways,
+          passage: Passages, arrivals: Arrivals, at: Situation, stays: BoolArray,
+          first: BoolArray, next_in: BoolArray, begin: IntArray, row: IntArray,
+          found: Meetings) -> int:
+    """Write the meetings for which there is room; return how many there are."""
     used = 0
-    rows = _rows_of(arrivals, len(at.slots))
     for i, slot in enumerate(at.slots):
-        for n in range(rows.begin[i], rows.begin[i + 1]):
-            mine = rows.row[n]
+        for n in range(begin[i], begin[i + 1]):
+            mine = row[n]
             if arrivals.step[mine] > max(passage.last[i], passage.granted[i]):
                 continue
             conflict = arrivals.conflict[mine]
@@ -164,28 +177,23 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                         and not (conflicts.merges[conflict] and (next_in[owner] or (
                             first[owner] and conflicts.priority[conflict] < -1))):
                     continue
-                if used == len(found.other):
-                    found = _grown(found)
-                _compare(conflicts, rules, agents, arrivals, mine, theirs, pair, at, found, used)
+                if used < len(found.other):
+                    _compare(conflicts, rules, agents, arrivals, mine, theirs, pair, at, found,
+                             used)
                 used += 1
         found.begin[i + 1] = used
-    return found
+    return used
 
 
-@compiled
+@bare
 def is_let_in(agents: AgentTable, slot: int, passage: Passages, i: int, step: int) -> bool:
     """Return whether an agent was let into the junction at a step of its way."""
     return bool(agents.grant[slot] >= 0 and step <= passage.granted[i])
 
 
-class _Rows(NamedTuple):
-    begin: IntArray
-    row: IntArray
-
-
 @compiled
-def _rows_of(arrivals: Arrivals, count: int) -> _Rows:
-    """List the rows of arrivals by agent."""
+def _rows_of(arrivals: Arrivals, count: int) -> tuple[IntArray, IntArray]:
+    """Return where the arrivals of each agent (count + 1) begin, and the rows of arrivals."""
     begin = np.zeros(count + 1, np.int64)
     for owner in arrivals.owner:
         if owner >= 0:
@@ -197,7 +205,7 @@ def _rows_of(arrivals: Arrivals, count: int) -> _Rows:
         if owner >= 0:
             row[fill[owner]] = n
             fill[owner] += 1
-    return _Rows(begin, row)
+    return begin, row
 
 
 @compiled
@@ -209,27 +217,14 @@ def _empty(agents: int, room: int) -> Meetings:
         np.empty(room, np.bool_), np.empty(room, np.bool_), np.empty(room, np.bool_))
 
 
-@compiled
-def _grown(found: Meetings) -> Meetings:
-    more, size = _empty(len(found.begin) - 1, 2 * len(found.other)), len(found.other)
-    more.begin[:] = found.begin
-    more.other[:size], more.into[:size] = found.other, found.into
-    more.step[:size], more.theirs[:size] = found.step, found.theirs
-    more.priority[:size], more.apart[:size] = found.priority, found.apart
-    more.inside[:size], more.committed[:size] = found.inside, found.committed
-    more.courteous[:size], more.gentle[:size] = found.courteous, found.gentle
-    more.tapers[:size] = found.tapers
-    return more
-
-
-@compiled
+@bare
 def _into(conflicts: ConflictTable, arrivals: Arrivals, n: int, pair: int) -> float:
     """Return the distance of a front from its conflict [m], negative inside."""
     return float(arrivals.offset[n] - arrivals.half[n]
                  + conflicts.start[pair, arrivals.conflict[n]])
 
 
-@compiled
+@bare
 def _out(conflicts: ConflictTable, arrivals: Arrivals, n: int, pair: int) -> float:
     """Return the distance of a rear from the end of its conflict [m]."""
     return float(arrivals.offset[n] + arrivals.half[n] + conflicts.end[pair, arrivals.conflict[n]])
@@ -263,7 +258,7 @@ def _can_let_go(into: float, speed: float, begun: bool) -> bool:
     return into > (0.0 if begun else REACTION * speed) + speed**2 / (2.0 * GENTLE)
 
 
-@compiled
+@bare
 def _compare(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable,
              arrivals: Arrivals, mine: int, theirs: int, pair: int, at: Situation,
              found: Meetings, n: int) -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from commonroad.common.common_lanelet import LaneletType
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.roads.signs import PRIORITY, sign_names, YIELDING
-from crgame_ros.traffic.compiling.compiled import compiled
+from crgame_ros.traffic.compiling.compiled import bare
 from crgame_ros.traffic.lanes.lane_graph import (
     DrivingSide,
     FloatArray,
@@ -82,13 +82,13 @@ class ConflictTable(NamedTuple):
     leave: FloatArray
 
 
-@compiled
+@bare
 def extent(width: float, other_width: float) -> int:
     """Return the extent of a conflict that counts for two vehicles: 0 if both are cars, or 1."""
     return 1 if max(width, other_width) > NARROW else 0
 
 
-@compiled
+@bare
 def spare_room(width: float, other_width: float) -> float:
     """
     Return how far a front may stand in a conflict so that another vehicle passes it there [m].
@@ -101,7 +101,7 @@ def spare_room(width: float, other_width: float) -> float:
     return reach - 0.5 * (width + WIDEST)
 
 
-@compiled
+@bare
 def touch(conflicts: ConflictTable, row: int, width: float, other_width: float) -> bool:
     """Return whether vehicles of two widths are in each other's way in a conflict."""
     between = 0.5 * (width + other_width) + conflicts.margin[row]

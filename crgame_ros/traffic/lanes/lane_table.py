@@ -5,7 +5,7 @@
 import math
 from typing import Any, cast, NamedTuple, Protocol
 
-from crgame_ros.traffic.compiling.compiled import compiled, inlined
+from crgame_ros.traffic.compiling.compiled import bare, compiled, inlined
 import numpy as np
 from numpy.typing import NDArray
 
@@ -133,12 +133,29 @@ def segment(lanes: LaneTable, lane: int, s: float) -> tuple[int, float]:
 
 
 @inlined
+def step_on(lanes: LaneTable, lane: int, x: float, y: float,
+            s: float) -> tuple[float, float, float]:
+    """
+    Return how far ahead of arc length s of a lane a position is, how far to its left, and heading.
+
+    Cosine and sine are interpolated, because headings of neighbouring points are nearly equal.
+    """
+    row, share = segment(lanes, lane, s)
+    here, after = lanes.line[row], lanes.line[row + 1]
+    east = x - here.x - share * (after.x - here.x)
+    north = y - here.y - share * (after.y - here.y)
+    inside = min(max(share, 0.0), 1.0)
+    cos = here.cos + inside * (after.cos - here.cos)
+    sin = here.sin + inside * (after.sin - here.sin)
+    return (east * cos + north * sin, north * cos - east * sin,
+            here.yaw + inside * (after.yaw - here.yaw))
+
+
+@inlined
 def project_on(lanes: LaneTable, lane: int, x: float, y: float, guess: float,
                rounds: int) -> tuple[float, float, float]:
     """
     Find a position in the coordinates of a lane, near an arc length that is guessed.
-
-    Cosine and sine are interpolated, because headings of neighbouring points are nearly equal.
 
     :param rounds: greatest number of corrections; one is enough for a guess that is off by
         centimetres.
@@ -146,17 +163,8 @@ def project_on(lanes: LaneTable, lane: int, x: float, y: float, guess: float,
     """
     s, d, yaw = guess, 0.0, 0.0
     for _ in range(rounds):
-        row, share = segment(lanes, lane, s)
-        here, after = lanes.line[row], lanes.line[row + 1]
-        east = x - here.x - share * (after.x - here.x)
-        north = y - here.y - share * (after.y - here.y)
-        inside = min(max(share, 0.0), 1.0)
-        cos = here.cos + inside * (after.cos - here.cos)
-        sin = here.sin + inside * (after.sin - here.sin)
-        ahead = east * cos + north * sin
+        ahead, d, yaw = step_on(lanes, lane, x, y, s)
         s += ahead
-        d = north * cos - east * sin
-        yaw = here.yaw + inside * (after.yaw - here.yaw)
         if abs(ahead) < FOUND:
             break
     return s, d, yaw
@@ -169,7 +177,7 @@ def angle_between(a: float, b: float) -> float:
     return turn - 2.0 * math.pi * float(np.rint(turn / (2.0 * math.pi)))
 
 
-@compiled
+@bare
 def time_at(lanes: LaneTable, lane: int, s: float) -> float:
     """Return `LaneTable.time` at an arc length; beyond the lane's ends as fast as there."""
     row, share = segment(lanes, lane, s)

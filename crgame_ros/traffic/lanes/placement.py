@@ -10,10 +10,12 @@ from crgame_ros.traffic.lanes.lane_cells import cell_of, CellTable
 from crgame_ros.traffic.lanes.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.lanes.lane_table import (
     angle_between,
+    FOUND,
     LaneTable,
     MOST_ROUNDS,
     nearest_row,
     project_on,
+    step_on,
 )
 import numpy as np
 from numpy.typing import NDArray
@@ -102,17 +104,20 @@ class Entries(NamedTuple):
 
 
 @compiled
-def place(lanes: LaneTable, cells: CellTable, bodies: Bodies) -> Entries:
+def place(lanes: LaneTable, cells: CellTable, bodies: Bodies,
+          wanted: NDArray[np.bool_]) -> Entries:
     """
-    Find the part of every lane that bodies take.
+    Find the part of each wanted lane that bodies take.
 
     A body's corners in the lane's coordinates bound it; `rear_within` finds the part of it that is
     in the way of an agent. If the body moves to the side, it also takes the room that it reaches
     within its time. A body that changes lanes takes the new lane already.
+
+    :param wanted: (L) whether a lane is; others have no entries.
     """
     cell = np.empty(len(bodies.owner), np.int64)
     found = _empty(len(lanes.first), _find_cells(cells, bodies, cell))
-    count = _find(lanes, cells, bodies, cell, found)
+    count = _find(lanes, cells, bodies, wanted, cell, found)
     order = np.empty(count, np.int64)
     fill = np.empty(len(lanes.first), np.int64)
     _sort(found, count, order, fill)
@@ -142,8 +147,8 @@ def _find_cells(cells: CellTable, bodies: Bodies, cell: IntArray) -> int:
 
 
 @bare
-def _find(lanes: LaneTable, cells: CellTable, bodies: Bodies, cell: IntArray,
-          found: Entries) -> int:
+def _find(lanes: LaneTable, cells: CellTable, bodies: Bodies, wanted: NDArray[np.bool_],
+          cell: IntArray, found: Entries) -> int:
     """Write the entries of all bodies; return how many there are."""
     count = 0
     for i in range(len(cell)):
@@ -157,6 +162,8 @@ def _find(lanes: LaneTable, cells: CellTable, bodies: Bodies, cell: IntArray,
                     * bodies.time[i], WALKER_SHIFT)
         for j in range(cells.starts[cell[i]], cells.starts[cell[i] + 1]):
             lane = cells.lanes[j]
+            if not wanted[lane]:
+                continue
             s, d, yaw = project_on(lanes, lane, x, y, cells.guesses[j], 1)
             if abs(d) > reach + FARTHEST:
                 continue
@@ -187,16 +194,12 @@ def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, ahea
     aside = v * cos - u * sin
     most = WALKER_SHIFT if bodies.time[i] > VEHICLE_TIME else VEHICLE_SHIFT
     drift = min(max(aside * bodies.time[i], -most), most)
+    _project_corners(lanes, lane, x, y, ahead_x, ahead_y, half_length, half_width, s, cos, sin,
+                     found.corners, n)
     rear = low = math.inf
     front = high = -math.inf
     for corner in range(4):
-        along = half_length if corner < 2 else -half_length
-        left = half_width if corner in (1, 2) else -half_width
-        at, off, _ = project_on(
-            lanes, lane, x + along * ahead_x - left * ahead_y,
-            y + along * ahead_y + left * ahead_x,
-            s + along * (ahead_x * cos + ahead_y * sin), MOST_ROUNDS)
-        found.corners[n, corner, 0], found.corners[n, corner, 1] = at, off
+        at, off = found.corners[n, corner, 0], found.corners[n, corner, 1]
         rear, front = min(rear, at), max(front, at)
         low, high = min(low, off), max(high, off)
     low, high = low + min(drift, 0.0), high + max(drift, 0.0)
@@ -213,6 +216,37 @@ def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, ahea
     found.acceleration[n] = bodies.acceleration[i] * turn
     found.crosses[n], found.claims[n] = turn < math.cos(CROSSING), claims
     return 1
+
+
+@inlined
+def _project_corners(lanes: LaneTable, lane: int, x: float, y: float, ahead_x: float,
+                     ahead_y: float, half_length: float, half_width: float, s: float, cos: float,
+                     sin: float, corners: FloatArray, n: int) -> None:
+    """
+    Write the corners of a body in the coordinates of a lane: each as `project_on` finds it.
+
+    All four take each step together, so that the processor need not wait for one after the other.
+
+    :param cos, sin: of the lane's heading at s.
+    """
+    for corner in range(4):
+        along = half_length if corner < 2 else -half_length
+        corners[n, corner, 0] = s + along * (ahead_x * cos + ahead_y * sin)
+    found = 0
+    for _ in range(MOST_ROUNDS):
+        for corner in range(4):
+            along = half_length if corner < 2 else -half_length
+            left = half_width if corner in (1, 2) else -half_width
+            at = corners[n, corner, 0]
+            ahead, off, _ = step_on(
+                lanes, lane, x + along * ahead_x - left * ahead_y,
+                y + along * ahead_y + left * ahead_x, at)
+            done = found >> corner & 1
+            corners[n, corner, 0] = at if done else at + ahead
+            corners[n, corner, 1] = corners[n, corner, 1] if done else off
+            found |= (1 if abs(ahead) < FOUND else 0) << corner
+        if found == 15:
+            break
 
 
 @compiled
