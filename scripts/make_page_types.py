@@ -65,8 +65,14 @@ def _literal(value: object) -> str:
     return f"'{value}'" if isinstance(value, str) else json.dumps(value)
 
 
-def interface(name: str, schema: dict[str, Any]) -> str:
-    """Return the interface of a message; a key with a default may be left out."""
+def declaration(name: str, schema: dict[str, Any]) -> str:
+    """Return the type of a message or of a part of it; what has a default may be left out."""
+    if schema.get('type') == 'array':
+        # A NamedTuple: JSON Schema has the names of its entries as titles.
+        entries = [f'  {part["title"].lower().replace(" ", "_")}'
+                   f'{"?" if "default" in part else ""}: {typescript(part)},'
+                   for part in schema['prefixItems']]
+        return '\n'.join((f'\nexport type {name} = [', *entries, '];', ''))
     needed = {'type', *schema.get('required', ())}
     lines = [f'  {key}{"" if key in needed else "?"}: {typescript(part)};'
              for key, part in schema['properties'].items()]
@@ -88,7 +94,7 @@ def types_of(unions: dict[str, Any]) -> str:
                 line += '\n '
             line += f' | {member}' if not line.endswith('=') else f' {member}'
         ends += line + ';\n'
-    return HEAD + ''.join(interface(name, known[name]) for name in sorted(known)) + ends
+    return HEAD + ''.join(declaration(name, known[name]) for name in sorted(known)) + ends
 
 
 def main() -> int:

@@ -14,9 +14,17 @@ from crgame_ros.game.task_documents import (
     PromptNumber,
     SteadySeconds,
 )
+from crgame_ros.game.view_documents import ViewPicture
 from crgame_ros.schema.messages import Flag, HexKey, Message, MessageId, MessageReader
 from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator, StringConstraints
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    model_validator,
+    StringConstraints,
+)
 
 # The map, and the viewpoints of the 3D view.
 SHOWN = ('map', 'driver', 'chase', 'bird')
@@ -321,10 +329,20 @@ class TaskDone(Message):
                          self.steady_s, self.clock_error_ms)
 
 
+class ViewTold(Message):
+    """What was where in a picture of a driver's 3D view."""
+
+    # The parts of the picture say for themselves which must have their very type.
+    model_config = ConfigDict(strict=False)
+
+    type: Literal['picture'] = 'picture'  # noqa: A003
+    picture: ViewPicture
+
+
 SeatOrder = Claim | Release | Ask | HandOver | Answer | Ready
 # Those that get a reply from the backend, and those that it carries out.
 Order = SeatOrder | Control | Rate | PlannerSwitch | Trigger
-Command = Input | TaskDone | Order
+Command = Input | TaskDone | ViewTold | Order
 PageMessage = (Command | Person | Role | DeviceUsed | Name | Layers | Sound | SeenView | Ping)
 _READER: MessageReader[PageMessage] = MessageReader(PageMessage)
 

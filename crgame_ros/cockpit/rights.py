@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 ROLES = ('direct', 'drive', 'watch', 'all')
 _DIRECTS = ('control', 'rate', 'planner', 'trigger')
 _DRIVES = ('input', 'claim', 'release', 'ask', 'hand_over', 'answer', 'ready', 'device',
-           'task')
+           'task', 'picture')
 _DEEDS = {'start': 'start the run', 'pause': 'pause the run', 'step': 'step through the run',
           'reset': 'reset the run', 'stop': 'stop the run', 'rate': 'change the speed of time',
           'planner': 'stop a planner or let it go on', 'trigger': 'trigger events',

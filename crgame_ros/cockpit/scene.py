@@ -249,7 +249,8 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
         'occupancy': game.occupancy is not None,
         'events': [document_entry(event) for event in game.events], 'sound': game.sound,
         'contact': game.drivability.contact,
-        'tasks': [_task(task, game.tasks) for task in game.tasks], 'language': game.language}
+        'tasks': [_task(task, game.tasks) for task in game.tasks], 'language': game.language,
+        'gaze': list(game.gaze_seats)}
     finite: Document = _finite(document)
     return finite
 

@@ -27,6 +27,7 @@ from crgame_ros.cockpit.page_messages import (
     SeenView,
     Sound,
     TaskDone,
+    ViewTold,
 )
 from crgame_ros.cockpit.request_guard import browser_of, granted
 from crgame_ros.errors import CrgameError, InputError
@@ -167,7 +168,7 @@ class Session:
             case _ if refusal and self._backend.mode == 'live':
                 if isinstance(message, Request):
                     self._reply(client, message, False, refusal)
-            case Input() | TaskDone():
+            case Input() | TaskDone() | ViewTold():
                 try:
                     await self._backend.command(client, message)
                 except CrgameError as error:

@@ -142,6 +142,12 @@ class GameDocument:
         """Return all driven vehicles, in the order of `/vehicles/state`."""
         return (*self.humans, *self.avs)
 
+    @property
+    def gaze_seats(self) -> tuple[str, ...]:
+        """Return the vehicles of whose drivers an instrument tells the gaze."""
+        gaze = () if self.instruments is None else self.instruments.gaze
+        return tuple(dict.fromkeys(each.seat for each in gaze if each.seat is not None))
+
     def human(self, vehicle_id: str) -> DrivenHuman | None:
         """Return a human's vehicle, None if it is not in the game."""
         return next((item for item in self.humans if item.id == vehicle_id), None)

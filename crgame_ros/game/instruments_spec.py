@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The instruments beside a game: streams of the Lab Streaming Layer, and triggers."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.schema.declaration import Form
-from crgame_ros.schema.marks import Advice, Listed, Within, Wording
+from crgame_ros.schema.marks import Advice, LeftOut, Listed, Within, Wording
 
-MAX_INLETS = 16
+MAX_INLETS, MAX_GAZE = 16, 8
 # The first words of markers, by which triggers choose them.
 MARKER_KINDS = ('trial', 'event', 'task', 'stimulus', 'shown', 'answer', 'missed', 'take_over',
                 'contact', 'marker')
@@ -47,6 +48,41 @@ class InletSpec:
         """Return the query of liblsl (XPath) that finds the streams."""
         given = (('name', self.name), ('type', self.type), ('source_id', self.source_id))
         return ' and '.join(f"{key}='{text}'" for key, text in given if text is not None)
+
+
+@dataclass(frozen=True)
+class GazeSpec:
+    """
+    A stream that tells where on the screen a driver looks, as x to the right and y downwards.
+
+    :param stream: its name; it is recorded.
+    :param seat: the vehicle whose driver it is of; the first human's by default.
+    :param x: name of its channel.
+    :param y: name of its channel.
+    :param unit: of x and y: pixels of the screen, or shares of the screen's or of the 3D view's
+        width and height, from 0 to 1.
+    :param confidence: name of the channel that tells how sure the device is.
+    :param least: below this confidence the gaze counts as lost.
+    :param margin: how far beside a thing the gaze may lie to be on it: the accuracy of the
+        device [deg]
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE, short='stream')
+
+    stream: StreamText
+    seat: Annotated[str | None, LeftOut()] = None
+    x: StreamText = 'x'
+    y: StreamText = 'y'
+    unit: Literal['pixels', 'screen', 'view'] = 'screen'
+    confidence: StreamText | None = None
+    least: float = 0.5
+    margin: Annotated[float, Within(0.0, 10.0)] = 1.0
+
+    @property
+    def channels(self) -> frozenset[str]:
+        """Return the names of the channels that it needs."""
+        names = (self.x, self.y, self.confidence)
+        return frozenset(name for name in names if name is not None)
 
 
 @dataclass(frozen=True)
@@ -114,6 +150,7 @@ class InstrumentsSpec:
 
     :param outlets: whether markers, vehicles and drivers are sent as LSL streams.
     :param inlets: streams of other programs to record.
+    :param gaze: streams of drivers' gaze: what they look at is told in tables.
     :param triggers: bytes to an amplifier.
     :param scope: `machine` keeps LSL on this machine; `network` takes liblsl's own configuration,
         which speaks multicast.
@@ -123,10 +160,21 @@ class InstrumentsSpec:
 
     outlets: bool = False
     inlets: Annotated[tuple[InletSpec, ...], Listed(0, MAX_INLETS, 'stream')] = ()
+    gaze: Annotated[tuple[GazeSpec, ...], Listed(0, MAX_GAZE, 'stream', own='stream')] = ()
     triggers: TriggerSpec | None = None
     scope: Literal['machine', 'network'] = 'machine'
 
     @property
     def streams(self) -> bool:
         """Return whether any of it needs LSL."""
-        return self.outlets or bool(self.inlets)
+        return self.outlets or bool(self.recorded)
+
+    @property
+    def recorded(self) -> tuple[InletSpec, ...]:
+        """Return the streams to record: the inlets, and those of gaze."""
+        return (*self.inlets, *(InletSpec(name=gaze.stream) for gaze in self.gaze))
+
+    def seated(self, vehicles: Sequence[str]) -> 'InstrumentsSpec':
+        """Return the same with the seat of each gaze: by default the first of some vehicles."""
+        return replace(self, gaze=tuple(replace(gaze, seat=gaze.seat or vehicles[0])
+                                        for gaze in self.gaze))

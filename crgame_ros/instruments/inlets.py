@@ -44,6 +44,7 @@ class Inlet:
 
     :param info: as the resolver has found it.
     :param number: of the stream.
+    :ivar described: whether names and units of its channels have come.
     """
 
     def __init__(self, info: Any, number: int) -> None:
@@ -61,7 +62,7 @@ class Inlet:
         self.samples = 0
         self.offset_s, self.uncertainty_s = _UNKNOWN
         self._connection = 0
-        self._described = False
+        self.described = False
         self._inlet: Any = pylsl.StreamInlet(info, max_buflen=BUFFER_S, recover=True,
                                              as_numpy=self.stream.format != 'string')
         _attempt(lambda: self._inlet.open_stream(0.0))
@@ -84,12 +85,12 @@ class Inlet:
 
     def _describe(self) -> None:
         """Read names and units of the channels, which come after the stream itself."""
-        if self._described:
+        if self.described:
             return
         info = _attempt(lambda: self._inlet.info(0.0))
         if info is None:
             return
-        self._described = True
+        self.described = True
         labels, units = info.get_channel_labels(), info.get_channel_units()
         count = len(self.stream.channels)
         if labels is not None and len(labels) == count:

@@ -228,10 +228,10 @@ class InstrumentsNode(Node):
             if stream.name not in self._outlets:
                 self._outlets[stream.name] = Outlet(stream, domain, spec.scope == 'machine')
         before = self._spec or InstrumentsSpec()
-        if spec.inlets != before.inlets:
+        if spec.recorded != before.recorded:
             own = {outlet.source_id for outlet in self._outlets.values()}
-            self._inlets = None if not spec.inlets else Inlets(
-                spec.inlets, own, TRIGGERS + 1, self.get_logger().info)
+            self._inlets = None if not spec.recorded else Inlets(
+                spec.recorded, own, TRIGGERS + 1, self.get_logger().info)
         if spec.triggers != before.triggers:
             if self._triggers is not None:
                 self._triggers.close()
@@ -317,6 +317,16 @@ class InstrumentsNode(Node):
                 self._publish_numbers(batch)
         self._publish_streams()
 
+    def _check_gaze(self) -> None:
+        """Say which channels of gaze a stream does not have: its samples would have no place."""
+        for gaze in self._spec.gaze if self._spec is not None else ():
+            for inlet in self._inlets.open if self._inlets is not None else ():
+                missing = sorted(gaze.channels - set(inlet.stream.channels))
+                if inlet.stream.name == gaze.stream and inlet.described and missing:
+                    complain(self, 'gaze', f'the stream {gaze.stream} has no channel '
+                             f'{", ".join(missing)}, but {", ".join(inlet.stream.channels)[:200]}:'
+                             ' name them in instruments: gaze')
+
     def _publish_numbers(self, batch: SampleBatch) -> None:
         label = batch.label([f'ch{place + 1}' for place in range(batch.values.shape[1])])
         width = label.count(',') + 1
@@ -340,6 +350,7 @@ class InstrumentsNode(Node):
         self._documents.publish(String(data=STREAMS.write(InstrumentStreams((*own, *found)))))
 
     def _report(self) -> None:
+        self._check_gaze()
         if self._inlets is not None:
             values: dict[str, object] = {}
             for inlet in self._inlets.open:

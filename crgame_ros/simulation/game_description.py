@@ -43,7 +43,7 @@ def describe_game(setup: Setup, *, epoch: int = 0, clock_offset_ns: int = 0,
         environment=environment_of(setup.loaded.scenario, game.environment),
         tasks=tuple(replace(task, seat=task_seat(task, setup.vehicle_ids))
                     for task in game.tasks),
-        instruments=game.instruments,
+        instruments=game.instruments and game.instruments.seated(setup.vehicle_ids),
         language=game.language, file=game.dump())
 
 

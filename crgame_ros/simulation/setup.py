@@ -190,6 +190,8 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
                 [*(human.id for human in game.humans), *(av.spec.id for av in avs)],
                 [*(item.id for item in obstacles.descriptions),
                  *(item.id for item in game.objects)])
+    _check_gaze(game, loaded.source,
+                [*(human.id for human in game.humans), *(av.spec.id for av in avs)])
     notices = [*loaded.notices, *(f'{loaded.source}: {remark}' for remark in remarks),
                *_discrepancies(avs), *(
         f'{loaded.source}: obstacle {number} is the recorded {av_id} itself and is left out'
@@ -301,6 +303,16 @@ def _vehicle(game: Game, name: str, network: RoadNetwork) -> VehicleParameters:
     parameters = load_vehicle_parameters(name, network.vehicle_type)
     return parameters if game.environment is None \
         else parameters.on_road(game.environment.friction)
+
+
+def _check_gaze(game: Game, where: str, vehicles: Sequence[str]) -> None:
+    """Refuse the gaze of a driver who has no vehicle in the game."""
+    for gaze in game.instruments.gaze if game.instruments is not None else ():
+        if not vehicles or (gaze.seat or vehicles[0]) not in vehicles:
+            raise InputError(f'there is no vehicle "{gaze.seat}"' if gaze.seat
+                             else 'the game has no driven vehicle',
+                             f'{where}: instruments: gaze {gaze.stream}',
+                             f'it has {", ".join(vehicles) or "none"}')
 
 
 def _place_avs(game: Game, parts: Sequence[Part], network: RoadNetwork) -> tuple[AvSetup, ...]:

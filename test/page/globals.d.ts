@@ -12,6 +12,7 @@ import type { createPerception } from '../../page/cockpit/js/perception/percepti
 import type { Sound } from '../../page/cockpit/js/sound/sound.js';
 import type { Stage } from '../../page/cockpit/js/stage/stage.js';
 import type { Store } from '../../page/cockpit/js/store.js';
+import type { Tasks } from '../../page/cockpit/js/tasks/tasks.js';
 import type { View3d } from '../../page/cockpit/js/view3d/view3d.js';
 import type { World } from '../../page/cockpit/js/world/world.js';
 
@@ -24,6 +25,7 @@ interface Crgame {
   person?: ReturnType<typeof createPerson>;
   perception?: ReturnType<typeof createPerception>;
   sound?: Sound;
+  tasks?: Tasks;
   view3d?: View3d;
   lastSeconds?: ReturnType<typeof createInstantReplay>;
   stage?: Stage;

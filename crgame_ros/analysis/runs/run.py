@@ -13,6 +13,7 @@ from crgame_ros.errors import CrgameError
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.driven_vehicle import DrivenVehicle
 from crgame_ros.recording.epochs import read_epoch
+from crgame_ros.recording.instrument_streams import read_streams, RecordedStream
 from crgame_ros.recording.offline_outcome import offline_outcome
 from crgame_ros.recording.plan_outcome import PlanOutcome, plans_of_report
 from crgame_ros.recording.reader import BagReader
@@ -213,6 +214,11 @@ class Run:
     def answers(self) -> dict[str, PlanOutcome]:
         """Return the known answers of planners, by AV."""
         return plans_of_report(self.outcome)
+
+    @cached_property
+    def streams(self) -> tuple[RecordedStream, ...]:
+        """Return the recorded streams of other instruments; empty of an offline run."""
+        return () if self.bag is None else read_streams(self.bag, self.game.epoch)
 
     @property
     def notices(self) -> tuple[str, ...]:

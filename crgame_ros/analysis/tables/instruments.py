@@ -15,7 +15,7 @@ from crgame_ros.analysis.tables.column import (
     TEXT,
 )
 from crgame_ros.analysis.tables.writer import PIECE_ROWS, TableRows
-from crgame_ros.recording.instrument_streams import read_streams, RecordedStream
+from crgame_ros.recording.instrument_streams import RecordedStream
 import numpy as np
 
 _STREAM = Column('stream', TEXT, '', 'its name, with the id of its device where two have the same')
@@ -67,9 +67,7 @@ def write_instruments(run: Run, writers: Mapping[str, TableRows]) -> None:
 
     :raises InputError: if the recording cannot be read.
     """
-    if run.bag is None:
-        return
-    for recorded in read_streams(run.bag, run.game.epoch):
+    for recorded in run.streams:
         channels = _distinct(recorded.stream.channels)
         _add_channels(run, recorded, channels, writers[INSTRUMENT_CHANNELS.name])
         _add_samples(run, recorded, channels, writers[INSTRUMENT_SAMPLES.name])

@@ -17,6 +17,7 @@ from crgame_ros.analysis.tables.data_package import (
     PACKAGE_FILE,
     WrittenTable,
 )
+from crgame_ros.analysis.tables.gaze import GAZE_TABLES, write_gaze
 from crgame_ros.analysis.tables.instruments import INSTRUMENT_TABLES, write_instruments
 from crgame_ros.analysis.tables.pairs import CROSSINGS, PAIRS, write_criticality
 from crgame_ros.analysis.tables.part import part_rows
@@ -144,7 +145,7 @@ def _earlier(out: Path) -> set[str]:
 
 TABLES: tuple[TableDeclaration, ...] = (
     RUNS, VEHICLES, STATES, PAIRS, CROSSINGS, EVENTS, PLANS, *BEHAVIOUR_TABLES, *TASK_TABLES,
-    *INSTRUMENT_TABLES)
+    *INSTRUMENT_TABLES, *GAZE_TABLES)
 
 
 def runs_in(paths: Sequence[Path], epoch: int | None, progress: RunProgress,
@@ -234,6 +235,7 @@ def _add_rows(run: Run, writers: Mapping[str, TableRows]) -> None:
     write_behaviour(run, writers)
     write_tasks(run, writers)
     write_instruments(run, writers)
+    write_gaze(run, writers)
     for table, parts in ((EVENTS, EVENT_PARTS), (VEHICLES, VEHICLE_PARTS), (RUNS, RUN_PARTS)):
         if (values := part_rows(parts, run))['run']:
             writers[table.name].add(values)

@@ -4,6 +4,7 @@
 
 import asyncio
 from collections.abc import Mapping
+import math
 from pathlib import Path
 import time
 from typing import Literal, NamedTuple
@@ -21,9 +22,11 @@ from crgame_ros.cockpit.page_messages import (
     Sound,
     TaskDone,
     Trigger,
+    ViewTold,
 )
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.task_documents import TaskReport
+from crgame_ros.game.view_documents import ViewPicture
 from crgame_ros.nodes.cockpit.feed import CockpitFeed
 from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.nodes.cockpit.seat_desk import PeopleFeed, SeatDesk
@@ -105,6 +108,8 @@ WATCH_PERIOD_S = 0.01
 IDLE_PERIOD_S = 0.05
 # Period of the work that may wait: services, names of people, orders without an answer [s].
 SERVE_PERIOD_S = 0.1
+# Pages tell ten pictures a second [s].
+LEAST_PICTURE_S = 0.04
 # A client that uploads a game gets its seat if the game begins within this time [s].
 BEGINS_WITHIN_S = 60.0
 _DEEDS = {'start': 'started the run', 'pause': 'paused the run', 'step': 'stepped through the run',
@@ -130,6 +135,8 @@ class LiveBackend:
         self._seat_slot = self._endpoints.polled('/seats')
         self._served_s = 0.0
         self._lost: dict[str, bool] = {}
+        # When the last picture of a seat's view was passed on.
+        self._pictures_s: dict[str, float] = {}
         self._pump: asyncio.Task[None] | None = None
         # The client that gets a seat in the next game, after which epoch, and until when.
         self._expected: tuple[Client, int, float] | None = None
@@ -229,6 +236,8 @@ class LiveBackend:
                 return self._desk.input(client, message)
             case TaskDone():
                 return self._report_task(client, message)
+            case ViewTold():
+                return self._tell_picture(client, message.picture)
             case Control():
                 return await self._control(client, message.action, message.all)
             case Rate():
@@ -283,6 +292,21 @@ class LiveBackend:
             self._desk.table.holding(client.id, seat)
         self._orders.report_task(TaskReport(
             seat, message.task, message.number, what, message.times))
+        return ''
+
+    def _tell_picture(self, client: Client, picture: ViewPicture) -> str:
+        """Pass on what the page of a seat showed where, if the game asks for it."""
+        seat, scenario = picture.seat, self._feed.scenario
+        game = None if scenario is None else scenario.game
+        if game is None or seat not in game.gaze_seats or picture.epoch != game.epoch:
+            raise InputError('nobody asks for the pictures of this view', seat)
+        if self._pages().get(seat) is not client or client.rights.seat not in ('', seat):
+            raise InputError('this is not the page of the driver in this seat', seat)
+        now_s = time.monotonic()
+        # A page that sends more than it should must not fill the disk.
+        if now_s - self._pictures_s.get(seat, -math.inf) >= LEAST_PICTURE_S:
+            self._pictures_s[seat] = now_s
+            self._orders.tell_picture(picture)
         return ''
 
     def _known_av(self, av: str) -> None:

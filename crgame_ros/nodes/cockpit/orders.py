@@ -8,6 +8,7 @@ from typing import Any
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.seat_documents import ORDER, SeatDemand
 from crgame_ros.game.task_documents import TASK_REPORT, TaskReport
+from crgame_ros.game.view_documents import VIEW_PICTURE, ViewPicture
 from crgame_ros.ros.endpoints import Endpoints
 from rcl_interfaces.srv import SetParameters
 from rclpy.client import Client
@@ -41,6 +42,7 @@ class CockpitOrders:
         self._triggers = endpoints.publisher('/trigger')
         self._seat_orders = endpoints.publisher('/seats/order')
         self._task_reports = endpoints.publisher(TASK_REPORT.topic)
+        self._pictures = endpoints.publisher(VIEW_PICTURE.topic)
 
     def close(self) -> None:
         """Release the executor."""
@@ -58,6 +60,10 @@ class CockpitOrders:
     def report_task(self, report: TaskReport) -> None:
         """Report what a page has shown of a task, or its driver's answer."""
         self._task_reports.publish(String(data=TASK_REPORT.write(report)))
+
+    def tell_picture(self, picture: ViewPicture) -> None:
+        """Tell what a page showed where."""
+        self._pictures.publish(String(data=VIEW_PICTURE.write(picture)))
 
     def order_seat(self, demand: SeatDemand) -> None:
         """Publish a demand about the driver of a seat."""

@@ -170,6 +170,7 @@ export interface Scene {
   events: GameEvent[];
   tasks?: GameTask[];
   language?: string; // of the texts for drivers
+  gaze?: string[]; // vehicles whose drivers' gaze is recorded: their pages tell what they show
   contact: 'through' | 'stop'; // what a contact does to a vehicle that a person drives
   sound: 'on' | 'none'; // whether pages may sound and gamepads rumble
   again?: number; // counts how often a recording was played

@@ -149,6 +149,17 @@ export interface SeenView {
   stage?: string | '';
 }
 
+export type ShownThing = [
+  kind: 'vehicle' | 'pedestrian' | 'object' | 'sign' | 'traffic_light' | 'mirror' | 'instrument' | 'task',
+  id: string,
+  left: number,
+  top: number,
+  right: number,
+  bottom: number,
+  distance_m?: number | null,
+  mirror?: string | null,
+];
+
 /** How loud the page is, and how strong its gamepad rumbles. */
 export interface Sound {
   type: 'sound';
@@ -179,6 +190,43 @@ export interface Trigger {
   event: string;
 }
 
-export type PageMessage = Input | TaskDone | Claim | Release | Ask | HandOver | Answer | Ready
-  | Control | Rate | PlannerSwitch | Trigger | Person | Role | DeviceUsed | Name | Layers | Sound
-  | SeenView | Ping;
+export type ViewEye = [
+  x: number,
+  y: number,
+  yaw: number,
+  height_m: number,
+  pitch: number,
+  across: number,
+  tall: number,
+];
+
+/** What was where in one picture of a driver's view. */
+export interface ViewPicture {
+  seat: string;
+  epoch: number;
+  steady_s: number;
+  clock_error_ms: number;
+  place: ViewPlace;
+  eye: ViewEye;
+  shown: ShownThing[];
+}
+
+export type ViewPlace = [
+  left: number,
+  top: number,
+  width: number,
+  height: number,
+  screen_width: number,
+  screen_height: number,
+  ratio: number,
+];
+
+/** What was where in a picture of a driver's 3D view. */
+export interface ViewTold {
+  type: 'picture';
+  picture: ViewPicture;
+}
+
+export type PageMessage = Input | TaskDone | ViewTold | Claim | Release | Ask | HandOver | Answer
+  | Ready | Control | Rate | PlannerSwitch | Trigger | Person | Role | DeviceUsed | Name | Layers
+  | Sound | SeenView | Ping;

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The report of this page's view to the server, which records the views of drivers. */
 
+import { fillsScreen } from './view3d/screen_place.js';
+
 import type { Connection } from './connection.js';
 import type { ViewMessage } from './messages.js';
 import type { Store } from './store.js';
@@ -91,12 +93,6 @@ class ViewReport {
     const { view3d, world } = window.crgame;
     return view3d?.on ? view3d.stats?.frames ?? 0 : world.stats.frames;
   }
-}
-
-/** Return whether the browser's window fills the screen, also around a frame. */
-function fillsScreen() {
-  return window.matchMedia('(display-mode: fullscreen)').matches
-    || (window.outerWidth >= window.screen.width && window.outerHeight >= window.screen.height);
 }
 
 /**

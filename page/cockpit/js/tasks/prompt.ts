@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** One stimulus or request on this page: the times of its first picture and of its answer. */
 
+import { painted } from '../painted.js';
+
 import type { GameTask, OpenPrompt, PageTimes } from './task_messages.js';
 import type { RunningTime } from './running_time.js';
 import type { ServerTime } from '../server_clock.js';
@@ -77,20 +79,14 @@ export class Prompt {
  * Apply a change just before a picture, and measure when that and the next one were drawn.
  *
  * @param change changes the picture
- * @returns when it was drawn (the browser runs a message that is sent in an animation frame after
- *   it has painted that frame), and the time from the beginning of this frame to that of the next
+ * @returns when it was drawn, and the time from the beginning of this frame to that of the next
  */
 export function inPicture(change: () => void): Promise<{ drawn_ms: number; picture_ms: number }> {
   return new Promise((resolve) => {
     requestAnimationFrame((frame_ms) => {
       change();
       let drawn_ms = NaN;
-      const channel = new MessageChannel();
-      channel.port1.onmessage = () => {
-        drawn_ms = performance.now();
-        channel.port1.close();
-      };
-      channel.port2.postMessage(null);
+      painted().then((at_ms) => { drawn_ms = at_ms; });
       requestAnimationFrame((next_ms) => {
         // A busy page may handle the message late, but never later than its next picture.
         resolve({ drawn_ms: Math.min(Number.isNaN(drawn_ms) ? next_ms : drawn_ms, next_ms),

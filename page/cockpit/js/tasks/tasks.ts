@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The tasks of the driver at this page: their view, and answers timed by the page's clock. */
 
+import { attends } from '../attending.js';
 import { Answers, keyName } from './answers.js';
 import { inPicture, Prompt } from './prompt.js';
 import { RequestTone } from './request_tone.js';
@@ -54,6 +55,16 @@ export class Tasks {
     return [...this.#prompts.values()];
   }
 
+  /** @returns what the driver sees of tasks now, the foremost first */
+  get shown(): { task: string; node: HTMLElement }[] {
+    const now_ms = performance.now();
+    const { light, request, note } = this.#view;
+    const parts = [[this.prompts.find((prompt) => prompt.lit(now_ms))?.task, light],
+      [this.#request?.prompt.task, request], [this.#lasting[0], note]] as const;
+    return parts.flatMap(([task, node]) => (task === undefined || node.hidden ? []
+      : [{ task: task.name, node }]));
+  }
+
   get #runs() {
     return this.#store.connected && this.#store.status?.run === 'running';
   }
@@ -81,17 +92,7 @@ export class Tasks {
 
   /** @returns the tasks of the game for this page's driver */
   get #mine(): GameTask[] {
-    const { mode, scene, seats, me } = this.#store;
-    return mode !== 'live' || me.id === '' ? [] : (scene?.tasks ?? []).filter(
-      ({ seat }) => seats[seat]?.holder === me.id || this.#rides(seat));
-  }
-
-  /** Return whether the person at this page rides in an AV that its planner drives. */
-  #rides(seat: string) {
-    const { seats, scene, rights } = this.#store;
-    const own = window.crgame.stage?.address.seat ?? rights.seat;
-    return own === seat && rights.drives && seats[seat] !== undefined && !seats[seat].holder
-      && scene?.vehicles.find(({ id }) => id === seat)?.role === 'autonomous';
+    return (this.#store.scene?.tasks ?? []).filter(({ seat }) => attends(this.#store, seat));
   }
 
   /** @returns this driver's active detection task */
@@ -155,7 +156,7 @@ export class Tasks {
         this.#prompts.delete(key);
       }
     }
-    this.#showWhatLasts(mine);
+    this.#showWhatLasts();
     this.#requestFrame();
   }
 
@@ -183,11 +184,15 @@ export class Tasks {
     }
   }
 
-  #showWhatLasts(mine: GameTask[]) {
+  /** @returns the secondary tasks of which this driver reads */
+  get #lasting(): GameTask[] {
     const { running } = this.#store.tasks;
-    const shown = this.#store.connected ? mine.filter(({ name, kind, show }) => show
+    return this.#store.connected ? this.#mine.filter(({ name, kind, show }) => show
       && kind === 'secondary_task' && running.includes(name)) : [];
-    this.#view.showNote(shown.map(({ name, label }) => `${this.#words.secondary}: `
+  }
+
+  #showWhatLasts() {
+    this.#view.showNote(this.#lasting.map(({ name, label }) => `${this.#words.secondary}: `
       + `${this.#labels.get(name) ?? (label || name)}`).join(' · '));
     this.#view.answerButton.hidden = this.#detecting === undefined;
   }

@@ -115,10 +115,11 @@ export class Mirrors {
     renderer.autoClear = true;
   }
 
-  /** Return each mirror's camera and place on the screen. */
-  get all(): { name: string; camera: PerspectiveCamera; rectangle: Rectangle }[] {
-    return this.#glasses.map(({ mirror, camera }) => (
-      { name: mirror.name, camera, rectangle: this.#rectangle(mirror) }));
+  /** Return each mirror's camera and place on the screen; the vehicle may lack it. */
+  get all(): { name: string; camera: PerspectiveCamera; rectangle: Rectangle;
+    optics: MirrorCamera | null }[] {
+    return this.#glasses.map(({ mirror, camera, optics }) => (
+      { name: mirror.name, camera, rectangle: this.#rectangle(mirror), optics }));
   }
 
   #rectangle({ name, width, height }: Mirror): Rectangle {

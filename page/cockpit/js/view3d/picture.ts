@@ -4,6 +4,7 @@
 
 import { above, chasing, mountedAt } from './cameras.js';
 import { createCabin } from './cabin.js';
+import { eyeOf, mirrorOf, seenBy } from './contents.js';
 import { FrameCost } from './frame_cost.js';
 import { localOrigin } from './local_origin.js';
 import { Mirrors } from './mirrors.js';
@@ -12,6 +13,7 @@ import { isSoftware, Quality } from './quality.js';
 import { createRoadWorld } from './road/road_world.js';
 import { roleColor } from './role_color.js';
 import { sightOf } from './seen_instances.js';
+import { product } from './solid_boxes.js';
 import { Traffic } from './traffic.js';
 import { standOf } from './vehicle_stand.js';
 
@@ -19,6 +21,7 @@ import type { Mesh, PerspectiveCamera } from 'three';
 import type { Scene, SceneVehicle } from '../messages.js';
 import type { Shown, Store } from '../store.js';
 import type { CameraPose, Stand, Viewpoint } from './cameras.js';
+import type { Contents, Sighting } from './contents.js';
 import type { RoadWorld } from './road/road_world.js';
 import type { Three } from './three.js';
 
@@ -58,6 +61,7 @@ export class Picture {
   #document: Scene | null = null;
   #cabin: { mesh: Mesh; vehicle: SceneVehicle } | null = null;
   #origin = { x: 0, y: 0 };
+  #last: { stand: Stand; mirrors: boolean; inside: boolean } | null = null;
   store;
 
   /**
@@ -165,8 +169,49 @@ export class Picture {
     if (inside && looks.mirrors) {
       this.mirrors.drawOver(this.#renderer);
     }
+    this.#last = { stand, inside, mirrors: inside && looks.mirrors };
     this.#note(shown.t, begin_ms, now_ms, measures);
     return true;
+  }
+
+  /** Return whether `contents` is known, once a picture has been drawn. */
+  get keepsPlaces() {
+    return this.#traffic.keepsPlaces;
+  }
+
+  set keepsPlaces(kept: boolean) {
+    this.#traffic.keepsPlaces = kept;
+  }
+
+  /** Return what was where in the last picture; null if that is not known. */
+  contents(): Contents | null {
+    const { placed } = this.#traffic;
+    if (placed === null || this.#last === null || this.#road === null || this.lost) {
+      return null;
+    }
+    const { stand, inside, mirrors } = this.#last;
+    const others = placed.filter(({ own }) => !own);
+    const things = [...inside ? others : placed, ...this.#road.solids];
+    // Mirrors are drawn in turn, and look old by a picture or two; here they are as new as the view.
+    const glasses = mirrors ? this.mirrors.all.flatMap(({ name, camera, rectangle, optics }) => {
+      if (optics === null) {
+        return [];
+      }
+      this.#aim(camera, mountedAt(stand, optics.point, optics.aside, optics.pitch));
+      return mirrorOf({ name, rectangle, ...this.#sighting(camera) }, others, this.#size);
+    }) : [];
+    const { position: { x, y, z }, fov, aspect } = this.#camera;
+    const forwards = this.#camera.getWorldDirection(new this.#three.Vector3());
+    return {
+      eye: eyeOf(stand, [x + this.#origin.x, y + this.#origin.y, z],
+        [forwards.x, forwards.y, forwards.z], fov * Math.PI / 180, aspect),
+      shown: [...glasses, ...seenBy(this.#sighting(this.#camera), things)],
+    };
+  }
+
+  #sighting({ projectionMatrix, matrixWorldInverse, position }: PerspectiveCamera): Sighting {
+    return { view: product(projectionMatrix.elements, matrixWorldInverse.elements),
+      eye: [position.x, position.y, position.z] };
   }
 
   #aimMain(stand: Stand, vehicle: SceneVehicle, { viewpoint, aside, height }: Looks) {

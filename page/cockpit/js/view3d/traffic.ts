@@ -13,13 +13,15 @@ import { Instances } from './instances.js';
 import { steeringOf } from './steering.js';
 
 import type { Group } from 'three';
-import type { Scene } from '../messages.js';
+import type { Scene, SceneObject } from '../messages.js';
 import type { Shown, Store } from '../store.js';
 import type { Appearance } from './bodies/appearance.js';
 import type { Body } from './bodies/motor_vehicles.js';
 import type { Origin } from './local_origin.js';
 import type { Three } from './three.js';
+import type { Named } from './contents.js';
 import type { Sight } from './seen_instances.js';
+import type { Triple } from './solid_boxes.js';
 
 export interface Thing {
   id: string;
@@ -31,7 +33,12 @@ export interface Thing {
   rolled: number; // distance of its wheels [m]
   wheelbase: number; // of the body as it is scaled; 0 without wheels [m]
   parked: boolean; // whether it is parked, without a driver
+  kind: PlacedBody['kind'];
+  bounds: { low: Triple; high: Triple } | null; // of its body, once they were asked for [m]
 }
+
+/** A body where it was placed last. */
+export interface PlacedBody extends Named { own: boolean }
 
 export type HeightAt = (x: number, y: number) => number; // of the road at a point of the map [m]
 
@@ -39,6 +46,10 @@ export type HeightAt = (x: number, y: number) => number; // of the road at a poi
 export class Traffic {
   /** Whether bodies have the map's colours, which show what drives them. */
   byRole = false;
+  /** Whether `placed` is kept. */
+  keepsPlaces = false;
+  /** The bodies as they were placed last; null while they are not kept. */
+  placed: PlacedBody[] | null = null;
   #three;
   /** Distances beyond which no body is drawn, and no wheel turns [m]. */
   limits = { farthest_m: 0, wheels_m: 0 };
@@ -102,7 +113,9 @@ export class Traffic {
     this.#vehicles = things.slice(0, scene.vehicles.length);
     this.#objects = things.slice(scene.vehicles.length);
     things.forEach((thing, i) => {
-      thing.parked = scene.objects[i - scene.vehicles.length]?.role === 'static';
+      const object = scene.objects[i - scene.vehicles.length] as SceneObject | undefined;
+      thing.parked = object?.role === 'static';
+      thing.kind = object === undefined ? 'vehicle' : kindOf(object.type, thing.body);
     });
     this.#parts.load(things.length);
     this.#headlights.load(scene.environment, things.length);
@@ -125,6 +138,7 @@ export class Traffic {
     }
     this.#parts.clear();
     this.#headlights.clear();
+    this.placed = this.keepsPlaces ? [] : null;
     for (let i = 0; i < this.#objects.length; i += 1) {
       const row = i * OBJECT_WIDTH;
       const [x, y, yaw, vx, vy, yaw_rate] = shown.objects.subarray(row, row + OBJECT_WIDTH);
@@ -183,7 +197,8 @@ export class Traffic {
   #thing(look: Appearance, body: Body, id: string, role: number): Thing {
     const along = (look.length ?? body.length) / body.length;
     return {
-      id, look, body, role, rolled: 0, parked: false,
+      id, look, body, role, rolled: 0, parked: false, kind: 'vehicle',
+      bounds: null,
       instances: this.#instances.get(look.key) as Instances,
       scale: [along, (look.width ?? body.width) / body.width,
         (look.height ?? body.height) / body.height],
@@ -225,7 +240,19 @@ export class Traffic {
     }
     this.#scaling.set(scale[0], scale[1], scale[2]);
     thing.instances.add(matrix.scale(this.#scaling), this.byRole ? thing.role : look.paint, own);
+    if (this.placed !== null) {
+      thing.bounds ??= body.mesh.bounds;
+      const { low: [rear, right], high } = thing.bounds;
+      // Wheels are no part of the mesh, and stand on the road.
+      this.placed.push({ id: thing.id, kind: thing.kind, own, matrix: matrix.toArray(),
+        low: [rear, right, 0], high });
+    }
   }
+}
+
+/** Return what people call a thing. */
+function kindOf(type: string, { wheels, lamps }: Body): PlacedBody['kind'] {
+  return type === 'pedestrian' ? type : wheels === null && lamps === null ? 'object' : 'vehicle';
 }
 
 /**

@@ -10,8 +10,10 @@ import { KeyAnswer } from './key_answer.js';
 import { SeatClock } from './seat_clock.js';
 import { createViewButtons } from './view_buttons.js';
 import { ViewSettings } from './view_settings.js';
+import { ViewTeller } from './view_teller.js';
 import { readViewWindow } from './view_window.js';
 
+import type { Connection } from '../connection.js';
 import type { Store } from '../store.js';
 import type { Looks, Picture } from './picture.js';
 
@@ -34,6 +36,7 @@ export class View3d {
   #viewpoint = this.window?.viewpoint ?? VIEWPOINTS[0];
   #stage;
   #store;
+  #teller;
   #clock;
   #canvas = element('canvas', { id: 'view3d', role: 'img', 'aria-label': '3D view',
     'aria-describedby': 'around', tabindex: 0, hidden: true });
@@ -46,9 +49,10 @@ export class View3d {
   #answer = new KeyAnswer();
   #wasLost = false;
 
-  constructor(stage: HTMLElement, store: Store) {
+  constructor(stage: HTMLElement, store: Store, connection: Connection) {
     this.#stage = stage;
     this.#store = store;
+    this.#teller = new ViewTeller(stage, store, connection);
     this.#clock = new SeatClock(store, this.window !== null,
       this.window?.vehicle ?? null);
     stage.prepend(this.#canvas);
@@ -215,16 +219,28 @@ export class View3d {
     this.#frame = requestAnimationFrame((next_ms) => this.#animate(next_ms));
     this.#notifyLoss(this.picture);
     this.#clock.follow(now_ms);
+    const { vehicle, picture } = this;
+    const told = this.window === null && this.#teller.wants(vehicle);
+    if (told !== picture.keepsPlaces) {
+      picture.keepsPlaces = told;
+      this.redraw();
+    }
+    this.#draw(now_ms, picture, vehicle);
+    if (told) {
+      this.#teller.tell(now_ms, picture, vehicle);
+    }
+  }
+
+  #draw(now_ms: number, picture: Picture, vehicle: string | null) {
     const shown = this.#store.displayed(now_ms);
-    const early = now_ms - this.#drawn_ms < this.picture.period_ms - EARLY_MS;
+    const early = now_ms - this.#drawn_ms < picture.period_ms - EARLY_MS;
     if (shown === null || (shown.t === this.#shown_t && this.#due === 0)
         || (early && !this.#answer.isDue(shown.t))) {
       return;
     }
-    const { vehicle } = this;
     this.#clock.send(now_ms, shown.t, vehicle);
-    this.picture.sharp = this.settings.switches.sharp;
-    if (this.picture.draw(shown, now_ms, this.#view(vehicle))) {
+    picture.sharp = this.settings.switches.sharp;
+    if (picture.draw(shown, now_ms, this.#view(vehicle))) {
       this.#due = shown.t === this.#shown_t ? this.#due - 1 : PICTURES_AFTER_CHANGE;
       this.#shown_t = shown.t;
       this.#drawn_ms = now_ms;
@@ -264,6 +280,6 @@ export class View3d {
  * @param root the stage, which holds the map
  * @param store what is shown
  */
-export function createView3d(root: HTMLElement, store: Store): View3d {
-  return new View3d(root, store);
+export function createView3d(root: HTMLElement, store: Store, connection: Connection): View3d {
+  return new View3d(root, store, connection);
 }

@@ -21,6 +21,17 @@ export class MeshBuilder {
     return this.#positions.length / 9;
   }
 
+  /** Return the opposite corners of the box around it. */
+  get bounds(): { low: Point; high: Point } {
+    const low: Point = [Infinity, Infinity, Infinity];
+    const high: Point = [-Infinity, -Infinity, -Infinity];
+    this.#positions.forEach((value, i) => {
+      low[i % 3] = Math.min(low[i % 3], value);
+      high[i % 3] = Math.max(high[i % 3], value);
+    });
+    return { low, high };
+  }
+
   /** Add a flat polygon, convex and counter-clockwise from outside. */
   polygon(corners: Point[], tint: Tint): this {
     const [red, green, blue, isPaint = false] = tint;

@@ -13,7 +13,7 @@ export interface Pole {
   hangs: boolean; // above the road, if there is no room beside it
 }
 
-export interface SignPole extends Pole { plates: { kind: string; value: string }[] }
+export interface SignPole extends Pole { id: number; plates: { kind: string; value: string }[] }
 export interface LightPole extends Pole { light: Light }
 
 // Room around a pole, and how far from its place it may be put [m].
@@ -59,7 +59,7 @@ export function placeSigns({ signs, lanelets }: Pick<Scene, 'signs' | 'lanelets'
     if (pole !== undefined) {
       pole.plates.push(plate);
     } else if (!sign.virtual || !told.has(sign)) {
-      const found = { ...poleAt(sign, index), plates: [plate] };
+      const found = { ...poleAt(sign, index), id: sign.id, plates: [plate] };
       if (!placed.some((other) => isSame(other, found))) {
         placed.push(found);
         poles.set(sign.id, found);

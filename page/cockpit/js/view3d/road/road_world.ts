@@ -21,6 +21,7 @@ import type { Environment, Scene } from '../../messages.js';
 import type { Store } from '../../store.js';
 import type { Sight } from '../seen_instances.js';
 import type { Three } from '../three.js';
+import type { Named } from '../contents.js';
 
 const LAND_ORDER = 900;
 
@@ -38,6 +39,7 @@ export interface RoadWorld {
   see: (sight: Sight) => void;
   heightAt: (x: number, y: number) => number; // of the road at a point of the map [m]
   setFine: (fine: boolean) => void; // see Detail
+  solids: Named[]; // signs and traffic lights
   triangles: number; // in the whole group, at most
   drawCalls: number; // at most, if all of it is visible
   build_ms: number; // build time
@@ -85,7 +87,7 @@ export function createRoadWorld(three: Three, scene: Scene): RoadWorld {
     ...lights.meshes, obstacles.mesh];
   group.add(atmosphere.group, ...all);
   return {
-    group, fog: atmosphere.fog, heightAt,
+    group, fog: atmosphere.fog, heightAt, solids: [...signs.solids, ...lights.solids],
     setEnvironment: (environment) => atmosphere.set(environment),
     update(store, _now_ms, eye) {
       scenery.update(eye);

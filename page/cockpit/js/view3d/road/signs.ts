@@ -6,6 +6,7 @@ import { geometryOf } from './materials.js';
 import { MeshParts } from './mesh_parts.js';
 import { addRound } from './scenery_shapes.js';
 import { NearInstances } from './near_instances.js';
+import { upright } from '../solid_boxes.js';
 import { SignAtlas } from './sign_atlas.js';
 import { faceOf } from './sign_faces.js';
 
@@ -17,6 +18,7 @@ import type { SignPole } from './poles.js';
 import type { Cell } from './sign_atlas.js';
 import type { Sight } from '../seen_instances.js';
 import type { Three } from '../three.js';
+import type { Named } from '../contents.js';
 
 // Heights of the lower edge of the lowest plate, and of one above a road [m].
 const LOWEST_M = 2.0;
@@ -34,6 +36,8 @@ const REACH_M = 600;
 
 /** All signs of a scene. */
 export class Signs {
+  /** The plates of each pole. */
+  solids: Named[];
   #texture;
   #plates;
   #poles;
@@ -47,9 +51,13 @@ export class Signs {
     painted: Material) {
     const atlas = new SignAtlas();
     const quads = new PlateQuads(origin);
+    this.solids = [];
     const poles = signs.map((sign) => {
       const ground = heights(sign.x, sign.y);
-      const top = quads.addPole(sign, ground, atlas, country);
+      const { top, bottom, width } = quads.addPole(sign, ground, atlas, country);
+      this.solids.push({ kind: 'sign', id: String(sign.id), ...upright(sign.x - origin.x,
+        sign.y - origin.y, sign.yaw, [-PLATE_OFF_POLE_M, -width / 2, bottom],
+        [PLATE_OFF_POLE_M, width / 2, top]) });
       return { x: sign.x - origin.x, y: sign.y - origin.y, z: ground, yaw: 0,
         size: [1, 1, sign.hangs ? 0 : top - ground] as [number, number, number],
         color: STEEL };
@@ -114,11 +122,13 @@ export class PlateQuads {
    * Add the plates of a pole, the first on top, and their backs.
    *
    * @param ground its height [m]
-   * @returns the height of the topmost edge [m]
+   * @returns the heights of their edges, and the width of the widest [m]
    */
   addPole({ x, y, yaw, hangs, plates }: SignPole, ground: number, atlas: SignAtlas,
-    country: string): number {
-    let bottom = ground + (hangs ? HANGING_M : LOWEST_M);
+    country: string): { bottom: number; top: number; width: number } {
+    const lowest = ground + (hangs ? HANGING_M : LOWEST_M);
+    let bottom = lowest;
+    let width = 0;
     for (const { kind, value } of plates.toReversed()) {
       const face = faceOf(kind, value, country);
       const size = SIZE_M[face.shape];
@@ -129,8 +139,9 @@ export class PlateQuads {
       this.add(...off(PLATE_OFF_POLE_M), z, yaw, size, atlas.cellOf(face));
       this.add(...off(PLATE_OFF_POLE_M - 0.01), z, yaw + Math.PI, size, atlas.backOf(face.shape));
       bottom += height + GAP_M;
+      width = Math.max(width, size);
     }
-    return bottom - GAP_M;
+    return { bottom: lowest, top: bottom - GAP_M, width };
   }
 
   /**

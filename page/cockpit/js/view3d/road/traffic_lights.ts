@@ -5,6 +5,7 @@
 import { geometryOf } from './materials.js';
 import { MeshParts } from './mesh_parts.js';
 import { NearInstances } from './near_instances.js';
+import { upright } from '../solid_boxes.js';
 import { addBox, addRound } from './scenery_shapes.js';
 import { PlateQuads, plateTexture } from './signs.js';
 import { SYMBOLS } from './sign_symbols.js';
@@ -17,6 +18,8 @@ import type { Cell } from './sign_atlas.js';
 import type { Sight } from '../seen_instances.js';
 import type { Instance } from './near_instances.js';
 import type { Three } from '../three.js';
+import type { Named } from '../contents.js';
+import type { Triple } from '../solid_boxes.js';
 
 /** Lamps from the top, and the lit ones of each state. */
 export const LAMPS = ['red', 'yellow', 'green'] as const;
@@ -31,6 +34,9 @@ const HANGING_M = 5;
 const APART_M = 0.33;
 const LAMP_M = 0.28;
 const HOUSING_M = 0.14;
+/** Corners of the board behind the lamps, from the lowest one's middle. */
+const BOARD: [low: Triple, high: Triple] = [[-0.02, -0.32, -0.34],
+  [0.02, 0.32, 2 * APART_M + 0.34]];
 const MOST = 200;
 const REACH_M = 700;
 const MASK_PX = 128;
@@ -42,6 +48,8 @@ const ARROWS: Record<string, string[]> = {
 
 /** All traffic lights of a scene. */
 export class TrafficLights {
+  /** The board of each light. */
+  solids: Named[];
   #three;
   #lights;
   #texture;
@@ -66,6 +74,9 @@ export class TrafficLights {
       color: 0xffffff });
     const feet = lights.map(({ x, y }) => heights(x, y));
     const bases = lights.map(({ hangs }, i) => feet[i] + (hangs ? HANGING_M : LOWEST_M));
+    this.solids = lights.map(({ x, y, yaw, light }, i) => ({ kind: 'traffic_light',
+      id: String(light.id), ...upright(x - origin.x, y - origin.y, yaw,
+        above(BOARD[0], bases[i]), above(BOARD[1], bases[i])) }));
     lights.forEach((pole, i) => {
       LAMPS.forEach((_, lamp) => quads.add(
         pole.x - (HOUSING_M + 0.02) * Math.cos(pole.yaw),
@@ -136,6 +147,10 @@ export class TrafficLights {
   }
 }
 
+function above([x, y, z]: Triple, base: number): Triple {
+  return [x, y, z + base];
+}
+
 /** Draw the masks of lamps, by direction. */
 function lampMasks(): { canvas: HTMLCanvasElement; cells: Record<string, Cell> } {
   const canvas = document.createElement('canvas');
@@ -173,6 +188,6 @@ function poleShape() {
 function housingShape() {
   const parts = new MeshParts({ x: 0, y: 0 });
   addBox(parts, [-HOUSING_M, -0.19, -0.2], [0.06, 0.19, 2 * APART_M + 0.2], [34, 37, 40]);
-  addBox(parts, [-0.02, -0.32, -0.34], [0.02, 0.32, 2 * APART_M + 0.34], [28, 30, 33]);
+  addBox(parts, ...BOARD, [28, 30, 33]);
   return parts;
 }

@@ -1,0 +1,19 @@
+// SPDX-FileCopyrightText: 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** Whether the person at this page is the driver of a seat, or rides in it. */
+
+import type { Store } from './store.js';
+
+/** Return whether the person at this page drives a vehicle, or rides in an AV. */
+export function attends(store: Store, seat: string): boolean {
+  const { mode, me, seats } = store;
+  return mode === 'live' && me.id !== ''
+    && (seats[seat]?.holder === me.id || rides(store, seat));
+}
+
+/** Return whether the person rides in an AV that its planner drives. */
+function rides({ seats, scene, rights }: Store, seat: string) {
+  const own = window.crgame.stage?.address.seat ?? rights.seat;
+  return own === seat && rights.drives && seats[seat] !== undefined && !seats[seat].holder
+    && scene?.vehicles.find(({ id }) => id === seat)?.role === 'autonomous';
+}
