@@ -39,6 +39,35 @@ DRIVEN_S = 3.0
 HAS_BEGUN = 'window.crgame?.ready && crgame.world.shown && crgame.store.status'
 ALARMS = 'return crgame.alarms.kinds()'
 HIDDEN = Path(__file__).with_name('hidden_pedestrian.yaml')
+# The page tells as if the game had named a stream of gaze; the server has nobody to tell.
+TELLS = """
+const send = crgame.connection.send.bind(crgame.connection);
+crgame.connection.send = (message) => {
+  if (message.type === 'picture') { window.told = message.picture.shown; return true; }
+  return send(message);
+};
+crgame.store.scene.gaze = ['hv0'];
+"""
+BOXES = """
+const stage = document.querySelector('#stage');
+for (const [kind, id, left, top, right, bottom, , mirror] of window.told) {
+  const box = document.createElement('div');
+  const color = { vehicle: '#ff2d6f', mirror: '#00c2ff', sign: '#ffd400', traffic_light: '#ffd400',
+    instrument: '#39e600' }[kind] ?? '#ff8a00';
+  const at = (value) => `${100 * value}%`;
+  box.style = `position: absolute; z-index: 99; left: ${at(left)}; top: ${at(top)};
+    width: ${at(right - left)}; height: ${at(bottom - top)}; border: 2px solid ${color};
+    pointer-events: none; box-sizing: border-box`;
+  if (mirror === null && right - left > 0.015) {
+    const name = document.createElement('span');
+    name.textContent = id;
+    name.style = `position: absolute; left: -2px; ${top < 0.05 ? 'top' : 'bottom'}: 100%;
+      color: #000; background: ${color}; font: 11px sans-serif; padding: 0 3px`;
+    box.append(name);
+  }
+  stage.append(box);
+}
+"""
 PAUSE = 'document.querySelector(\'[data-action="pause"]:enabled\')?.click()'
 
 
@@ -290,6 +319,25 @@ def take_3d(folder: Path) -> None:
             shoot(person.browser, viewpoint)
 
 
+def take_gaze(folder: Path) -> None:
+    """Drive in dense traffic, and draw over the view what the page tells of it."""
+    with page(folder, 'light', *waiting(folder, 'traffic')) as person:
+        browser = person.browser
+        person.take_seat('hv0')
+        browser.run_async('return await crgame.view3d.show(true)')
+        browser.wait('crgame.view3d.stats.frames > 0', 'the 3D view')
+        browser.run(TELLS)
+        person.click('[data-action="start"]')
+        time.sleep(DRIVEN_S)
+        browser.wait('window.told?.some(([, , , , , , , mirror]) => mirror !== null)',
+                     'what is in a mirror')
+        person.click('[data-action="pause"]')
+        browser.run("crgame.view3d.settings.set('sharp', true)")
+        time.sleep(SETTLES_S)
+        browser.run(BOXES)
+        shoot(browser, 'gaze')
+
+
 def take_over(folder: Path) -> None:
     """Run a script to the end of its game, and show the page then."""
     # The picture shows the folder of its files, too: as with run.sh.
@@ -305,7 +353,8 @@ SESSIONS = (
     Session(('4k',), take_4k), Session(('history', 'timing'), take_figures),
     Session(('events', 'scenario'), take_events), Session(('alarm', 'replay'), take_alarm),
     Session(('perception',), take_perception), Session(('driver', 'chase'), take_3d),
-    Session(('over',), take_over), Session(('people',), take_people),
+    Session(('gaze',), take_gaze), Session(('over',), take_over),
+    Session(('people',), take_people),
 )
 
 

@@ -56,7 +56,8 @@ class GazeSpec:
     A stream that tells where on the screen a driver looks, as x to the right and y downwards.
 
     :param stream: its name; it is recorded.
-    :param seat: the vehicle whose driver it is of; the first human's by default.
+    :param seat: the vehicle whose driver it is of; by default the first human's, and in a study
+        the participant's.
     :param x: name of its channel.
     :param y: name of its channel.
     :param unit: of x and y: pixels of the screen, or shares of the screen's or of the 3D view's

@@ -5,10 +5,10 @@
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.view_documents import ShownThing, VIEW_PICTURE, ViewPicture
+from crgame_ros.game.view_documents import VIEW_PICTURE, ViewEye, ViewPicture, ViewPlace
 from crgame_ros.recording.reader import BagReader
 import numpy as np
 from numpy.typing import NDArray
@@ -54,25 +54,32 @@ class SeatPictures:
     boxes: FloatArray
     distances: FloatArray
 
-    @classmethod
-    def of(cls, pictures: list[ViewPicture]) -> Self:
-        """Return some pictures of one seat, given in any order; one or more."""
-        times_s, first = np.unique([item.steady_s for item in pictures], return_index=True)
-        ordered = [pictures[place] for place in first]
-        numbers: dict[ShownName, int] = {}
-        shown = [thing for item in ordered for thing in item.shown]
-        things = [numbers.setdefault(_name_of(thing), len(numbers)) for thing in shown]
-        return cls(
-            times_s, np.array([item.place for item in ordered]),
-            np.array([item.eye for item in ordered]),
-            np.cumsum([0, *(len(item.shown) for item in ordered)]), tuple(numbers),
-            np.array(things, dtype=np.int64),
-            np.array([thing[2:6] for thing in shown]).reshape(-1, 4),
-            np.array([thing.distance_m for thing in shown], dtype=np.float64))
 
+class PictureKeeper:
+    """The pictures of one seat while they are read: numbers alone, as a drive has many."""
 
-def _name_of(thing: ShownThing) -> ShownName:
-    return ShownName(thing.kind, thing.id, thing.mirror)
+    def __init__(self) -> None:
+        self._numbers: dict[ShownName, int] = {}
+        self._pictures: dict[float, tuple[ViewPlace, ViewEye, FloatArray]] = {}
+
+    def add(self, picture: ViewPicture) -> None:
+        """Keep a picture; of two at the same time, the first."""
+        rows = [(self._numbers.setdefault(ShownName(thing.kind, thing.id, thing.mirror),
+                                          len(self._numbers)),
+                 thing.left, thing.top, thing.right, thing.bottom, thing.distance_m)
+                for thing in picture.shown]
+        self._pictures.setdefault(picture.steady_s, (
+            picture.place, picture.eye, np.array(rows, dtype=np.float64).reshape(-1, 6)))
+
+    def kept(self) -> SeatPictures:
+        """Return all of them; one or more."""
+        times_s = sorted(self._pictures)
+        places, eyes, parts = zip(*(self._pictures[at_s] for at_s in times_s), strict=True)
+        rows = np.concatenate(parts)
+        return SeatPictures(
+            np.array(times_s), np.array(places), np.array(eyes),
+            np.cumsum([0, *map(len, parts)]), tuple(self._numbers), rows[:, 0].astype(np.int64),
+            rows[:, 1:5], rows[:, 5])
 
 
 def read_pictures(path: Path, epoch: int) -> dict[str, SeatPictures]:
@@ -81,7 +88,7 @@ def read_pictures(path: Path, epoch: int) -> dict[str, SeatPictures]:
 
     :raises InputError: if the recording cannot be read.
     """
-    found: dict[str, list[ViewPicture]] = defaultdict(list)
+    found: dict[str, PictureKeeper] = defaultdict(PictureKeeper)
     with BagReader(path, parts=True) as reader:
         if VIEW_PICTURE.topic not in reader.topics:
             return {}
@@ -93,5 +100,5 @@ def read_pictures(path: Path, epoch: int) -> dict[str, SeatPictures]:
                 reader.foreign[topic] += 1
                 continue
             if picture.epoch == epoch:
-                found[picture.seat].append(picture)
-    return {seat: SeatPictures.of(pictures) for seat, pictures in found.items()}
+                found[picture.seat].add(picture)
+    return {seat: keeper.kept() for seat, keeper in found.items()}

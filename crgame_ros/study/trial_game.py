@@ -65,7 +65,7 @@ def trial_game(settings: TrialSettings, driver: str) -> Game:
 
 
 def _seated(settings: TrialSettings, driver: str, game: Game) -> Game:
-    """Return the game with its driver and tasks in the participant's vehicle, the only driver."""
+    """Return the game with driver, tasks and gaze in the participant's vehicle, alone."""
     seat = seat_of(settings, game)
     for human in game.humans:
         if human.id != seat and human.driver == COCKPIT:
@@ -75,8 +75,13 @@ def _seated(settings: TrialSettings, driver: str, game: Game) -> Game:
         if task.seat not in (None, seat):
             raise InputError(f'task {task.name} is for {task.seat}, and the participant sits in '
                              f'{seat}', settings.game or 'trial', 'leave out its "seat"')
+    for gaze in game.instruments.gaze if game.instruments is not None else ():
+        if gaze.seat not in (None, seat):
+            raise InputError(f'gaze {gaze.stream} is of {gaze.seat}, and the participant sits in '
+                             f'{seat}', settings.game or 'trial', 'leave out its "seat"')
     return replace(
-        game, tasks=tuple(replace(task, seat=seat) for task in game.tasks),
+        game, instruments=game.instruments and game.instruments.seated([seat]),
+        tasks=tuple(replace(task, seat=seat) for task in game.tasks),
         humans=tuple(replace(human, driver=driver) if human.id == seat else human
                      for human in game.humans))
 

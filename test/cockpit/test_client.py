@@ -161,6 +161,11 @@ def test_the_bucket_allows_the_burst_then_the_rate() -> None:
 # A page reports its picture in this form; numeric flags become booleans.
 MAP_VIEW = {'shown': 'map', 'inset': 0, 'plans': 1, 'mirrors': 0, 'bare': 1, 'software': 0,
             'width_px': 900.0, 'height_px': 500.0, 'ratio': 2.0, 'renderer': ''}
+PICTURE = {
+    'seat': 'hv0', 'epoch': 2, 'steady_s': 1000.5, 'clock_error_ms': 0.4,
+    'place': [0, 23.5, 800, 500, 1920, 1080, 1.5], 'eye': [1e5, -3.0, 0.1, 1.2, 0.0, 0.77, 0.43],
+    'shown': [['mirror', 'mirror_left', 0, 0.4, 0.2, 0.6],
+              ['vehicle', 'o12', 0.4, 0.45, 0.6, 0.5, 31.07, None]]}
 GOOD: list[tuple[dict[str, Any], dict[str, Any]]] = [
     ({'type': 'input', 'seat': 'hv0', 'keys': [1, 0, 0, 1], 'reverse': 1, 'more': 1},
      {'type': 'input', 'seat': 'hv0', 'keys': [True, False, False, True], 'reverse': True}),
@@ -213,6 +218,9 @@ GOOD: list[tuple[dict[str, Any], dict[str, Any]]] = [
       'response_ms': 312, 'delay_ms': 20.5},
      {'type': 'task', 'seat': 'hv0', 'task': 'light', 'number': 3, 'what': 'answer',
       'response_ms': 312.0, 'delay_ms': 20.5}),
+    ({'type': 'picture', 'picture': PICTURE},
+     {'type': 'picture', 'picture': PICTURE | {'shown': [
+         ['mirror', 'mirror_left', 0, 0.4, 0.2, 0.6, None, None], PICTURE['shown'][1]]}}),
 ]
 
 
@@ -280,6 +288,18 @@ BAD = {
     'task begins': '{"type": "task", "seat": "hv0", "task": "x", "number": 1, "what": "begin"}',
     'task for ever': '{"type": "task", "seat": "hv0", "task": "x", "number": 1, '
                      '"what": "answer", "response_ms": 1e12}',
+    **{f'picture with {what}': json.dumps({'type': 'picture', 'picture': PICTURE | change})
+       for what, change in (
+           ('no seat', {'seat': 'x'}), ('a text for a time', {'steady_s': '1000'}),
+           ('no time', {'steady_s': float('nan')}), ('an epoch of text', {'epoch': '2'}),
+           ('a short place', {'place': [0, 0, 1, 1]}), ('an infinite eye', {'eye': [1e999] * 7}),
+           ('an unknown kind', {'shown': [['cloud', 'a', 0, 0, 1, 1]]}),
+           ('a path', {'shown': [['vehicle', '../a', 0, 0, 1, 1]]}),
+           ('a number as id', {'shown': [['vehicle', 7, 0, 0, 1, 1]]}),
+           ('a box outside', {'shown': [['vehicle', 'o1', 0, 0, 1.1, 1]]}),
+           ('a short row', {'shown': [['vehicle', 'o1', 0, 0, 1]]}),
+           ('a negative distance', {'shown': [['vehicle', 'o1', 0, 0, 1, 1, -1]]}),
+           ('too much', {'shown': [['vehicle', 'o1', 0, 0, 1, 1]] * 201}))},
 }
 
 
@@ -287,7 +307,7 @@ BAD = {
 def test_anything_else_is_refused_without_repeating_it(text: str) -> None:
     with pytest.raises(InputError) as caught:
         parse_message(text)
-    assert len(str(caught.value)) < 80
+    assert len(str(caught.value)) < 120
 
 
 def test_names_lose_what_hides_or_marks_up() -> None:

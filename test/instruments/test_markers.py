@@ -92,6 +92,10 @@ def test_the_longest_words_choose_the_byte() -> None:
     ('triggers: {port: /dev/a, codes: {stimulus: true}}', 'from 1 to 255'),
     ('triggers: {port: /dev/a, codes: {gaze: 1}}', 'begin with one of'),
     ('triggers: {port: /dev/a, codes: {}}', '"codes" is empty'),
+    ('gaze: [{x: x}]', 'stream'),
+    ('gaze: [Eyes, {stream: Eyes, seat: av0}]', 'Eyes'),
+    ('gaze: [{stream: Eyes, unit: cm}]', 'pixels, screen, view'),
+    ('gaze: [{stream: Eyes, margin: -1}]', 'margin'),
     ('scope: world', 'machine, network')])
 def test_what_cannot_be_meant_is_refused(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):

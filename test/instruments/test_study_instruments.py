@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Instruments that a study gives once, for the games of all its trials."""
 
+from dataclasses import replace
 from pathlib import Path
 
+from crgame_ros.errors import InputError
 from crgame_ros.game.file import load_game, parse_game
 from crgame_ros.game.instruments_spec import InstrumentsSpec
 from crgame_ros.paths import scenarios_directory
@@ -13,6 +15,7 @@ from crgame_ros.simulation.roster import Participants
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.study.trial_game import trial_game
 from crgame_ros.study.trial_settings import laid, TrialSettings
+import pytest
 import yaml
 
 TEXT = """
@@ -44,3 +47,26 @@ def test_a_study_gives_them_once(tmp_path: Path) -> None:
     bare = build_setup(load_game(game))
     assert not Participants.from_setup(bare).instruments
     assert describe_game(bare).instruments is None
+
+
+def test_gaze_is_recorded_and_is_of_the_participant(tmp_path: Path) -> None:
+    """By default it is the first human's, in a study whoever takes part; others are refused."""
+    game = load_game(scenarios_directory() / 'cut_in.yaml')
+    gaze: InstrumentsSpec = read(InstrumentsSpec, {
+        'inlets': ['Heart'], 'gaze': ['Eyes', {'stream': 'B', 'seat': 'av0'}]}, '')
+    assert [inlet.name for inlet in gaze.recorded] == ['Heart', 'Eyes', 'B']
+    assert gaze.streams
+    described = describe_game(build_setup(replace(game, instruments=gaze)))
+    assert described.gaze_seats == ('hv0', 'av0')
+    assert describe_game(build_setup(game)).gaze_seats == ()
+    with pytest.raises(InputError, match='no vehicle "hv7"'):
+        build_setup(replace(game, instruments=read(
+            InstrumentsSpec, {'gaze': [{'stream': 'Eyes', 'seat': 'hv7'}]}, '')))
+    file = tmp_path / 'game.yaml'
+    file.write_text(game.dump())
+    settings = {'game': str(file), 'seat': 'av0', 'instruments': {'gaze': ['Eyes']}}
+    made = trial_game(laid(_settings(settings)), 'cockpit')
+    assert describe_game(build_setup(made)).gaze_seats == ('av0',)
+    other = settings | {'instruments': {'gaze': [{'stream': 'Eyes', 'seat': 'hv0'}]}}
+    with pytest.raises(InputError, match='the participant sits in av0'):
+        trial_game(laid(_settings(other)), 'cockpit')

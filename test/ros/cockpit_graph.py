@@ -152,7 +152,7 @@ async def _run(check: Check) -> None:
     hub, backend = Hub('live'), LiveBackend(node)
     try:
         with Peer(domain, '/seats/order', ('/<v>/driver_command', 'hv0'),
-                  '/diagnostics') as peer:
+                  '/diagnostics', '/views/pictures') as peer:
             await backend.start(hub)
             await check(Graph(peer, hub, backend, node))
             assert backend._pump is not None and not backend._pump.done()

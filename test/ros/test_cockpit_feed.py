@@ -13,6 +13,8 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.documents import EVENTS, FiredEvents
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.file import load_game
+from crgame_ros.game.instruments_spec import GazeSpec, InstrumentsSpec
+from crgame_ros.game.view_documents import VIEW_PICTURE
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.ros.messages import from_time, to_time
 from crgame_ros.simulation.setup import build_setup, Setup
@@ -178,6 +180,45 @@ def test_what_the_person_in_a_seat_hears_and_sees_is_told(setup: Setup) -> None:
                 'away': 'focus', 'full_screen': 'true', 'device': ''}
         await graph.until(lambda: told(graph, 'view')[-1][1] == seen, 'the new view')
         assert told(graph, 'view')[-1][0] == OFFSET_NS + 200_000_000
+    lived(check)
+
+
+def test_the_page_of_a_seat_alone_tells_what_its_view_shows(setup: Setup) -> None:
+    """Not a second page, not of another run, not if nobody asks, and not too often."""
+    watched = replace(setup, game=replace(setup.game, instruments=InstrumentsSpec(
+        gaze=(GazeSpec('Eyes', 'hv0'),))))
+
+    def picture(name: str, seat: str = 'hv0', epoch: int = 1) -> dict[str, Any]:
+        return {'seat': seat, 'epoch': epoch, 'steady_s': 1.0, 'clock_error_ms': 0.5,
+                'place': [0, 0, 9, 9, 9, 9, 1], 'eye': [0, 0, 0, 1.2, 0, 1, 1],
+                'shown': [['vehicle', name, 0, 0, 1, 1, 5.0]]}
+
+    def told(graph: Graph) -> list[str]:
+        return [VIEW_PICTURE.read(message.data).shown[0].id
+                for message in graph.peer.messages['/views/pictures']]
+
+    async def check(graph: Graph) -> None:
+        page, other = graph.page(), graph.page()
+        await graph.begin(setup)
+        await graph.seats('cockpit')
+        await graph.ask(page, 'claim', seat='hv0')
+        await graph.until(lambda: graph.seat().get('holder') == page.id, 'the seat')
+        with pytest.raises(InputError, match='nobody asks'):
+            await graph.ask(page, 'picture', picture=picture('unasked', epoch=0))
+        await graph.begin(watched, epoch=1)
+        for client, shown, why in (
+                (other, picture('of_another'), 'not the page'),
+                (page, picture('of_the_av', 'av0'), 'nobody asks'),
+                (page, picture('of_a_run_before', epoch=0), 'nobody asks')):
+            with pytest.raises(InputError, match=why):
+                await graph.ask(client, 'picture', picture=shown)
+        await graph.until(lambda: graph.node.count_subscribers('/views/pictures'), 'the peer')
+        for name in ('first', 'hasty', 'hasty'):
+            await graph.ask(page, 'picture', picture=picture(name))
+        await graph.pause(0.1)
+        await graph.ask(page, 'picture', picture=picture('last'))
+        await graph.until(lambda: 'last' in told(graph), 'the pictures')
+        assert told(graph) == ['first', 'last']
     lived(check)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from crgame_ros.analysis.behaviour.gaze import GazeSamples, looked_at, LookedAt, on_the_ground
 from crgame_ros.game.instruments_spec import GazeSpec
 from crgame_ros.game.view_documents import ShownThing, ViewEye, ViewPicture, ViewPlace
-from crgame_ros.recording.view_pictures import SeatPictures
+from crgame_ros.recording.view_pictures import PictureKeeper
 import numpy as np
 import pytest
 import shapely
@@ -43,7 +43,10 @@ def look(pictures: list[ViewPicture], at_s: Any, x: Any, y: Any, spec: GazeSpec 
     columns = np.broadcast_arrays(*(np.asarray(each, dtype=float) for each in (at_s, x, y)))
     samples = GazeSamples(*(np.atleast_1d(each) for each in columns),
                           None if confidence is None else np.array(confidence))
-    return looked_at(samples, SeatPictures.of(pictures), spec, road)
+    keeper = PictureKeeper()
+    for each in pictures:
+        keeper.add(each)
+    return looked_at(samples, keeper.kept(), spec, road)
 
 
 def test_a_box_is_between_those_of_the_pictures_around_the_sample() -> None:

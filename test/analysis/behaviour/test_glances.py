@@ -36,7 +36,7 @@ def test_a_glance_is_the_transition_and_the_dwell() -> None:
 
 
 def test_what_is_shorter_than_a_fixation_is_on_the_way() -> None:
-    """A car that the gaze crosses in 80 ms is not looked at; one that it stays on for 120 ms is."""
+    """A car that the gaze crosses in 80 ms is not looked at; one for 120 ms is."""
     assert rows((ROAD, 1.0), (CAR, 0.08), (LEFT, 0.5)) == [
         (ROAD, 0.0, 0.0, 1.0), (LEFT, 1.0, 0.08, 0.5)]
     assert rows((ROAD, 1.0), (CAR, 0.08), (ROAD, 0.5)) == [(ROAD, 0.0, 0.0, 1.58)]

@@ -24,8 +24,6 @@ export interface Contents { eye: ViewEye; shown: ShownThing[] }
 
 // Smaller things are not told: a car at 600 m [share of the picture's width or height].
 const SMALLEST = 0.002;
-// As many as the server takes, with what lies over the view.
-const MOST = 180;
 const DIGITS = 4;
 
 /**
@@ -95,11 +93,6 @@ export function eyeOf(stand: Stand, point: Triple, forwards: Triple, height: num
     rounded(Math.max(above, 0), 3),
     rounded(Math.asin(Math.min(Math.max(along(forwards), -1), 1)), 5),
     rounded(tall * aspect, 5), rounded(tall, 5)];
-}
-
-/** Return the things of a picture that are told, if there are too many: the foremost. */
-export function foremost(shown: ShownThing[]): ShownThing[] {
-  return shown.slice(0, MOST);
 }
 
 function rounded(value: number, digits: number) {

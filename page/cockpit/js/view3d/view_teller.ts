@@ -4,7 +4,7 @@
 
 import { attends } from '../attending.js';
 import { painted } from '../painted.js';
-import { foremost, thingOf } from './contents.js';
+import { thingOf } from './contents.js';
 import { ScreenPlace } from './screen_place.js';
 
 import type { Connection } from '../connection.js';
@@ -15,6 +15,8 @@ import type { Picture } from './picture.js';
 const EVERY_MS = 100;
 // Tolerance of animation frames that arrive early [ms].
 const EARLY_MS = 4;
+// As many things as the server takes.
+const MOST = 200;
 /** Parts of the page that lie over the view, the foremost first, by their names in tables. */
 const INSTRUMENTS = [['speedometer', '#hud .hud-speed'], ['dashboard', '#hud .hud-board'],
   ['map', '#stage.with-inset > #world']];
@@ -52,7 +54,7 @@ export class ViewTeller {
     this.#told_ms = now_ms;
     const { epoch, serverClock } = this.#store;
     const place = this.#place.of(this.#stage);
-    const shown = foremost([...this.#overlays(), ...contents.shown]);
+    const shown = [...this.#overlays(), ...contents.shown].slice(0, MOST);
     painted().then((drawn_ms) => {
       const time = serverClock.at(drawn_ms);
       if (time !== null) {
