@@ -3,9 +3,10 @@
 """Checks a study before its first session: missing files, balance, and drivable conditions."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Literal
 
 from crgame_ros.errors import CrgameError
@@ -13,9 +14,11 @@ from crgame_ros.game.file import parse_game
 from crgame_ros.instruments.extra import require_instruments
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
+from crgame_ros.study.answer_condition import AnswerCondition
 from crgame_ros.study.file import Block, Break, DeviceCheck, Page, Questions, StudyFile
 from crgame_ros.study.local_text import LocalText
 from crgame_ros.study.pages import page_file, questionnaire_name, steps_of
+from crgame_ros.study.question import ChoiceQuestion, Question
 from crgame_ros.study.questionnaire import load_questionnaire
 from crgame_ros.study.session_script import (
     drives_of,
@@ -69,7 +72,7 @@ def check_study(study: StudyFile,
 
     :param progress: called with the share that is done, 0 to 1.
     """
-    found = [*_steps(study), *_balance(study)]
+    found = [*_steps(study), *_conditions_on_answers(study), *_balance(study)]
     drives = list(drives_of(study))
     tasks: set[str] = set()
     for number, (name, settings) in enumerate(drives):
@@ -180,31 +183,84 @@ def _untold(study: StudyFile, name: str, texts: Iterable[LocalText]) -> Iterator
             yield StudyFinding('warning', f'{name}: has no texts in "{language}"')
 
 
+def _conditions_on_answers(study: StudyFile) -> Iterator[StudyFinding]:
+    """Yield what conditions on answers name that nobody is asked."""
+    fields = {field.name: field for field in study.fields}
+    scales: dict[str, dict[str, Question]] = {}
+    for step in dict.fromkeys(steps_of(study)):
+        with suppress(CrgameError):
+            if isinstance(step, Questions):
+                scale = load_questionnaire(questionnaire_name(study, step))
+                scales[scale.name] = {question.name: question for question in scale.questions}
+    for scale_name, questions in scales.items():
+        for question in questions.values():
+            if question.when is not None and question.when.field is not None:
+                yield from _untestable(f'{scale_name}: {question.name}: when', question.when,
+                                       fields)
+    for field in study.fields:
+        if field.when is not None:
+            yield from _untestable(f'fields: {field.name}: when', field.when, fields)
+    for number, rule in enumerate(study.exclude):
+        when = rule.when
+        if when is not None:
+            yield from _untestable(
+                f'exclude[{number}]', when, fields if when.field is not None
+                else scales.get(when.questionnaire or '', {}))
+        elif not any(question.expect is not None for questions in (fields, *scales.values())
+                     for question in questions.values()):
+            yield StudyFinding('error', f'exclude[{number}]: no question has an expected answer')
+
+
+def _untestable(where: str, when: AnswerCondition,
+                known: Mapping[str, Question]) -> Iterator[StudyFinding]:
+    """Yield why a condition can never hold: its question is not there, or takes no such answer."""
+    name = when.field or when.question or ''
+    if name not in known:
+        yield StudyFinding('error', f'{where}: "{name}" is asked nowhere; name '
+                           f'{", ".join(known) or "a question that is asked"}')
+        return
+    kind = known[name].kind
+    for value in when.values:
+        given: object = value
+        if isinstance(kind, ChoiceQuestion):
+            given = [str(value)] if kind.several else str(value)
+        if refusal := kind.refusal(given):
+            yield StudyFinding('error', f'{where}: {value} is no answer to "{name}"; {refusal}')
+    if (when.at_least is not None or when.below is not None) and not hasattr(kind, 'bounds'):
+        yield StudyFinding('error', f'{where}: "{name}" has no numbers')
+
+
 def _balance(study: StudyFile) -> Iterator[StudyFinding]:
-    for block in study.blocks:
+    groups = study.group_names
+    places = study.participants // len(groups)
+    if study.participants % len(groups):
+        yield StudyFinding('warning', f'groups: {study.participants} participants do not make '
+                                      f'{len(groups)} groups of equal size')
+    for block, group in product(study.blocks, groups):
         try:
-            orders = [[trial.condition.name for trial in plan_trials(study, place)
-                       if trial.block == block.name] for place in range(study.participants)]
+            orders = [[trial.condition.name for trial in plan_trials(study, place, group)
+                       if trial.block == block.name] for place in range(places)]
         except CrgameError as error:
             yield StudyFinding('error', str(error))
             continue
         conditions = len(conditions_of(study, block))
         if conditions > 1:
-            yield from _unbalanced(study, block, conditions, orders)
+            name = f'{block.name} in {group}' if group else block.name
+            yield from _unbalanced(name, block, conditions, orders)
 
 
-def _unbalanced(study: StudyFile, block: Block, conditions: int,
+def _unbalanced(name: str, block: Block, conditions: int,
                 orders: list[list[str]]) -> Iterator[StudyFinding]:
     first = Counter(order[0] for order in orders)
     if len(first) < conditions or len(set(first.values())) > 1:
         rows = rows_of(block.order, conditions)
         mend = f'take a multiple of {rows} participants' if block.order == 'williams' \
             and not block.sequences else 'take "order: williams"'
-        yield StudyFinding('warning', f'{block.name}: with {study.participants} participants not '
+        yield StudyFinding('warning', f'{name}: with {len(orders)} participants not '
                                       f'every condition is first equally often; {mend}')
     follows = Counter(pair for order in orders for pair in _within(order, conditions))
     if len(follows) < conditions * (conditions - 1) or len(set(follows.values())) > 1:
-        yield StudyFinding('warning', f'{block.name}: not every condition follows every other '
+        yield StudyFinding('warning', f'{name}: not every condition follows every other '
                                       'equally often')
 
 

@@ -10,12 +10,14 @@ from crgame_ros.errors import InputError
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Folder, Keyed, Listed, Within, Wording
 from crgame_ros.schema.reading import read
+from crgame_ros.study.groups import Groups
 from crgame_ros.study.local_text import LocalText, Text
 from crgame_ros.study.names import Name
 from crgame_ros.study.planned_analysis import PlannedAnalysis
 from crgame_ros.study.quality import QualityBounds
-from crgame_ros.study.question import Question
+from crgame_ros.study.question import check_conditions, Question
 from crgame_ros.study.retention import Retention
+from crgame_ros.study.screening import Exclusion
 from crgame_ros.study.trial_order import OrderKind
 from crgame_ros.study.trial_settings import Factor, NOTHING, TrialSettings
 from crgame_ros.yaml_text import read_yaml
@@ -92,11 +94,13 @@ class StepEntry:
     A step of participants between trials.
 
     :param step: the step.
+    :param groups: only for these groups; for all by default.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
 
     step: Annotated[Step, Keyed(STEPS, 'step')]
+    groups: Annotated[tuple[str, ...], Listed(noun='group')] = ()
 
 
 Steps = Annotated[tuple[StepEntry, ...], Listed(0, 50, 'step')]
@@ -175,6 +179,8 @@ class StudyFile:
     :param seed: of all orders.
     :param participants: planned number, for the checks of balance.
     :param fields: questions to each participant at the start.
+    :param exclude: rules that end a session.
+    :param groups: a factor between participants.
     :param markers: that the experimenter can set by a key during a session.
     :param retention: until when the participants' data may be kept.
     :param quality: the bounds of data that hold, and what happens beyond them.
@@ -197,6 +203,8 @@ class StudyFile:
     seed: Annotated[int, Within(0, 2**63 - 1)] = 0
     participants: Annotated[int, Within(1, 10_000)] = 12
     fields: Annotated[tuple[Question, ...], Listed(0, 50, 'question', 'name')] = ()
+    exclude: Annotated[tuple[Exclusion, ...], Listed(0, 50, 'rule')] = ()
+    groups: Groups | None = None
     markers: Annotated[tuple[str, ...], Listed(0, 9, 'marker')] = ('marker',)
     retention: Retention | None = None
     quality: QualityBounds = QualityBounds()
@@ -208,7 +216,7 @@ class StudyFile:
     base: Annotated[Path, Folder()] = Path('.')
 
     def check(self) -> None:
-        """Refuse blocks that name unknown factors or conditions, and comparisons that do."""
+        """Refuse what names factors, fields, questions or groups that are not there."""
         known = {factor.name for factor in self.factors}
         for block in self.blocks:
             for name in block.factors or ():
@@ -216,7 +224,54 @@ class StudyFile:
                     raise InputError(f'names the factor "{name}", which is not there',
                                      f'blocks: {block.name}',
                                      f'name {", ".join(sorted(known)) or "none"}')
-        self.analysis.check_factors(self.factors)
+        check_conditions(self.fields, are_fields=True)
+        self._check_groups()
+        self._check_exclusions()
+        self.analysis.check_factors(self.all_factors)
+
+    def _check_groups(self) -> None:
+        """Refuse groups that fields cannot form, and steps of groups that are not known there."""
+        names = () if self.groups is None else self.groups.names
+        if self.groups is not None:
+            self.groups.check_fields({field.name: field for field in self.fields})
+            if self.groups.name in {factor.name for factor in self.factors}:
+                raise InputError(f'has the name of the factor "{self.groups.name}"', 'groups',
+                                 'give it its own name')
+        for number, entry in enumerate(self.before):
+            if entry.groups:
+                raise InputError('is only for some groups, which are not known yet',
+                                 f'before[{number}]', 'put it into "before" of the first block')
+        for entry in (*self.after, *(entry for block in self.blocks for entry in (
+                *block.before, *block.after_trial, *block.after))):
+            for name in entry.groups:
+                if name not in names:
+                    raise InputError(f'names the group "{name}", which is not there', 'a step',
+                                     f'name {", ".join(names) or "none: there are no groups"}')
+
+    def _check_exclusions(self) -> None:
+        known = {field.name for field in self.fields}
+        for number, rule in enumerate(self.exclude):
+            name = None if rule.when is None else rule.when.field
+            if name is not None and name not in known:
+                raise InputError(f'names the field "{name}", which is not there',
+                                 f'exclude[{number}]',
+                                 f'name {", ".join(sorted(known)) or "none"}')
+
+    @property
+    def all_factors(self) -> tuple[Factor, ...]:
+        """Return the factors within participants, and the one between them."""
+        return (*self.factors, *((self.groups.factor,) if self.groups is not None else ()))
+
+    @property
+    def group_names(self) -> tuple[str, ...]:
+        """Return the names of the groups; one empty name in a study without groups."""
+        return ('',) if self.groups is None else self.groups.names
+
+    def group_settings(self, group: str) -> TrialSettings:
+        """Return the settings of a group; none if its name is empty."""
+        if self.groups is None or not group:
+            return NOTHING
+        return next(level.settings for level in self.groups.levels if level.name == group)
 
     @property
     def all_languages(self) -> tuple[str, ...]:

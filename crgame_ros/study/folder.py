@@ -14,6 +14,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell_scene import values_of_game
 from crgame_ros.evaluation.content import ContentStore, digests_in
 from crgame_ros.recording.run_folder import PARTICIPANTS, STUDY_FILE
+from crgame_ros.study.enrolment import enrolled, free_place, read_enrolment
 from crgame_ros.study.file import Page, Questions, StudyFile
 from crgame_ros.study.pages import steps_of
 from crgame_ros.study.session_journal import read_journal
@@ -132,10 +133,7 @@ class StudyFolder:
     @property
     def participants(self) -> list[str]:
         """Return the participants who have begun, in the order of their places."""
-        folder = self.root / PARTICIPANTS
-        found = [(places[0], path.name) for path in (folder.iterdir() if folder.is_dir() else ())
-                 if (places := _places(path))]
-        return [name for _, name in sorted(found)]
+        return [each.participant for each in enrolled(self.root / PARTICIPANTS)]
 
     def participant(self, name: str) -> Path:
         """Return the folder of a participant, which may not exist yet."""
@@ -143,12 +141,8 @@ class StudyFolder:
 
     def place_of(self, name: str) -> int:
         """Return a participant's place among all: the stored one, or the next free one."""
-        own = _places(self.participant(name))
-        if own:
-            return own[0]
-        taken = {place for other in self.participants
-                 for place in _places(self.participant(other))}
-        return next(place for place in range(len(taken) + 1) if place not in taken)
+        own = read_enrolment(self.participant(name))
+        return free_place(self.root / PARTICIPANTS) if own is None else own.place
 
     def begin(self, name: str) -> None:
         """
@@ -156,7 +150,7 @@ class StudyFolder:
 
         :raises InputError: if the id is not valid, or its participant withdraws.
         """
-        if not _places(self.participant(name)):
+        if read_enrolment(self.participant(name)) is None:
             check_new_participant(name)
         self.check_withdrawals()
 
@@ -234,7 +228,3 @@ def _beside(study: StudyFile) -> list[str]:
         elif isinstance(step, Questions) and step.name.endswith(('.yaml', '.yml')):
             names[step.name] = None
     return [name for name in names if '..' not in Path(name).parts]
-
-
-def _places(folder: Path) -> list[int]:
-    return [entry['place'] for entry in read_journal(folder) if entry['entry'] == 'begun']

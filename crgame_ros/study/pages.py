@@ -8,16 +8,17 @@ from pathlib import Path
 from crgame_ros.errors import InputError
 from crgame_ros.study.file import Page, Questions, Step, StudyFile
 from crgame_ros.study.question import Question
-from crgame_ros.study.questionnaire import load_questionnaire
+from crgame_ros.study.questionnaire import load_questionnaire, Questionnaire
 from crgame_ros.study.session_script import Fields, SessionItem
 
 
 def steps_of(study: StudyFile) -> tuple[Step, ...]:
-    """Return all steps between drives, each as often as in the file."""
+    """Return all steps between drives, each as often as in the file, then pages of exclusions."""
     entries = [*study.before, *study.after]
     for block in study.blocks:
         entries += [*block.before, *block.after_trial, *block.after]
-    return tuple(entry.step for entry in entries)
+    ends = tuple(Page(rule.page) for rule in study.exclude if rule.page is not None)
+    return (*(entry.step for entry in entries), *ends)
 
 
 def page_file(study: StudyFile, page: Page, language: str) -> Path | None:
@@ -54,10 +55,15 @@ def questionnaire_name(study: StudyFile, step: Questions) -> str:
     return str(study.base / step.name) if is_file else step.name
 
 
+def questionnaire_of(study: StudyFile, item: SessionItem) -> Questionnaire | None:
+    """Return the questionnaire of an item; None without one."""
+    return load_questionnaire(questionnaire_name(study, item.what)) \
+        if isinstance(item.what, Questions) else None
+
+
 def questions_of(study: StudyFile, item: SessionItem) -> tuple[Question, ...]:
-    """Return the questions of an item; empty without any."""
+    """Return the questions of an item, in the order of their file; empty without any."""
     if isinstance(item.what, Fields):
         return study.fields
-    if isinstance(item.what, Questions):
-        return load_questionnaire(questionnaire_name(study, item.what)).questions
-    return ()
+    scale = questionnaire_of(study, item)
+    return () if scale is None else scale.questions

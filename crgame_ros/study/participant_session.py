@@ -3,17 +3,27 @@
 """A participant's session: finished items, the next item, and resuming after any end."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 import time
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from crgame_ros.errors import InputError
+from crgame_ros.study.enrolment import allocation_of, enrolled, enrolling, free_place
 from crgame_ros.study.file import Page, StudyFile
-from crgame_ros.study.pages import questions_of
-from crgame_ros.study.question import check_answers, Question
+from crgame_ros.study.given_answers import exclusion_of, field_answers, last_answers
+from crgame_ros.study.groups import allocate, Allocation
+from crgame_ros.study.pages import questionnaire_of, questions_of
+from crgame_ros.study.question import asked_of, check_answers, Question
 from crgame_ros.study.session_journal import SessionEvent, SessionJournal
-from crgame_ros.study.session_script import PracticeDrives, session_of, SessionItem
+from crgame_ros.study.session_script import (
+    Fields,
+    items_before_groups,
+    PracticeDrives,
+    session_of,
+    SessionItem,
+)
 from crgame_ros.study.trial_plan import PlannedTrial
 
 
@@ -24,29 +34,114 @@ class ParticipantSession:
     :param study: its study.
     :param folder: of the participant.
     :param participant: anonymous id.
-    :param place: among all participants, from 0 on.
+    :param place: among all participants, from 0 on; by default the participant's own, or the
+        first that is free.
     :param clock_s: seconds since 1970.
+    :param group: that the experimenter gives, where the study wants one of a new participant.
+    :ivar allocation: to a group; None before it, and in a study without groups.
     :raises InputError: if the study cannot be planned, another process has the session open, or
-        the participant has begun another study or has another place.
+        the participant has begun another study, or has another place or group.
     """
 
-    def __init__(self, study: StudyFile, folder: Path, participant: str, place: int,
-                 clock_s: Callable[[], float] = time.time) -> None:
-        self.study, self.participant, self.place = study, participant, place
-        self.items = session_of(study, place)
-        self._ids = {item.id: item for item in self.items}
-        self._clock_s = clock_s
+    def __init__(self, study: StudyFile, folder: Path, participant: str, place: int | None = None,
+                 clock_s: Callable[[], float] = time.time, *, group: str | None = None) -> None:
+        self.study, self.participant = study, participant
+        self._folder, self._clock_s = folder, clock_s
+        self.allocation: Allocation | None = None
+        for name in study.group_names:
+            session_of(study, 0, name)
         self.journal = SessionJournal(folder)
-        begun = next((entry for entry in self.journal.entries
-                      if entry['entry'] == SessionEvent.BEGUN), None)
-        mine = {'participant': participant, 'place': place,
-                'items': [item.id for item in self.items]}
-        if begun is None:
-            self._add(SessionEvent.BEGUN, **mine)
-        elif {name: begun[name] for name in mine} != mine:
+        try:
+            self._begin(place, group)
+            self._settle()
+        except InputError:
             self.journal.close()
-            raise InputError('began with another plan', str(folder),
+            raise
+
+    def _begin(self, place: int | None, group: str | None) -> None:
+        """Note the beginning, or take up what the journal has."""
+        begun, allocated = (next((entry for entry in self.journal.entries
+                                  if entry['entry'] == kind), None)
+                            for kind in (SessionEvent.BEGUN, SessionEvent.ALLOCATED))
+        self._check_given(group, begun)
+        with enrolling(self._folder.parent):
+            if place is None:
+                place = free_place(self._folder.parent) if begun is None else begun['place']
+            self.place = int(place)
+            self.items = session_of(self.study, self.place) if self.study.groups is None \
+                else items_before_groups(self.study)
+            mine = {'participant': self.participant, 'place': self.place,
+                    'items': [item.id for item in self.items]}
+            if begun is None:
+                self._add(SessionEvent.BEGUN, **mine, **({} if group is None else {
+                    'group': group}))
+        if allocated is not None:
+            self._take(allocation_of(allocated))
+        if begun is not None and {name: begun[name] for name in mine} != mine \
+                or allocated is not None and allocated['items'] != [
+                    item.id for item in self.items]:
+            raise InputError('began with another plan', str(self._folder),
                              'put the study file back, or name another participant')
+
+    def _check_given(self, group: str | None, begun: Mapping[str, Any] | None) -> None:
+        """Refuse a group where none is given, none where one is, and another than before."""
+        groups = self.study.groups
+        if groups is None or groups.allocation != 'given':
+            if group is not None:
+                raise InputError('is not given by the experimenter in this study', group,
+                                 'leave out --group')
+            return
+        names = f'one of {", ".join(groups.names)}'
+        if begun is None and group is None:
+            raise InputError('needs the group of a new participant', self.participant,
+                             f'give --group, {names}')
+        if group is not None and group not in groups.names:
+            raise InputError('is no group of this study', group, f'give {names}')
+        if begun is not None and group is not None and begun.get('group') != group:
+            raise InputError(f'is in the group {begun.get("group")} already', self.participant,
+                             'leave out --group: a group is given once')
+
+    def _take(self, allocation: Allocation) -> None:
+        self.allocation = allocation
+        self.items = session_of(self.study, allocation.place, allocation.group)
+
+    def _settle(self) -> None:
+        """
+        Exclude the participant, or allocate a group, as soon as what decides is in the journal.
+
+        It is called again when a session is opened, so that nothing is lost between two entries.
+        """
+        if self._has_ended:
+            return
+        answers = last_answers(self.journal.entries)
+        rule = exclusion_of(self.study, self.items, answers)
+        if rule is not None:
+            last = next(entry['item'] for entry in reversed(self.journal.entries)
+                        if entry['entry'] == SessionEvent.FINISHED)
+            self._add(SessionEvent.EXCLUDED, item=last, reason=rule.told, page=rule.page)
+        elif self._awaits_group and self.done >= {item.id for item in self.items}:
+            self._allocate(field_answers(self.items, answers))
+
+    @property
+    def _awaits_group(self) -> bool:
+        return self.study.groups is not None and self.allocation is None
+
+    def _allocate(self, fields: Mapping[str, Any]) -> None:
+        groups = self.study.groups
+        assert groups is not None
+        with enrolling(self._folder.parent):
+            others = [(each.dropped_out, each.allocation)
+                      for each in enrolled(self._folder.parent)
+                      if each.participant != self._folder.name]
+            before = [(dropped_out, each) for dropped_out, each in others if each is not None]
+            self._take(allocate(
+                groups, self.study.seed, fields,
+                [each for dropped_out, each in before if not dropped_out], len(before),
+                next(entry.get('group') for entry in self.journal.entries
+                     if entry['entry'] == SessionEvent.BEGUN)))
+            assert self.allocation is not None
+            self._add(SessionEvent.ALLOCATED, **asdict(self.allocation),
+                      items=[item.id for item in self.items])
 
     def __enter__(self) -> Self:
         return self
@@ -73,10 +168,28 @@ class ParticipantSession:
     @property
     def next_item(self) -> SessionItem | None:
         """Return the present item; None at the end, or once the session was ended."""
-        if any(entry['entry'] == SessionEvent.ENDED for entry in self.journal.entries):
+        if self._has_ended:
             return None
         done = self.done
-        return next((item for item in self.items if item.id not in done), None)
+        # If an allocation could not be noted, the item before it comes again.
+        return next((item for item in self.items if item.id not in done),
+                    self.items[-1] if self._awaits_group else None)
+
+    @property
+    def _has_ended(self) -> bool:
+        return any(entry['entry'] in (SessionEvent.ENDED, SessionEvent.EXCLUDED)
+                   for entry in self.journal.entries)
+
+    @property
+    def planned_items(self) -> tuple[SessionItem, ...]:
+        """Return all items; those of the first group as long as the own is not known."""
+        return session_of(self.study, 0, self.study.group_names[0]) if self._awaits_group \
+            else self.items
+
+    @property
+    def fields(self) -> Mapping[str, Any]:
+        """Return the participant's answers to the fields."""
+        return field_answers(self.items, last_answers(self.journal.entries))
 
     @property
     def language(self) -> str | None:
@@ -125,8 +238,17 @@ class ParticipantSession:
         return attempt
 
     def questions(self, item: SessionItem) -> tuple[Question, ...]:
-        """Return the questions of an item; empty without any."""
-        return questions_of(self.study, item)
+        """
+        Return the questions of an item in the order in which they are shown; empty without any.
+
+        Those are among them whose condition does not hold.
+        """
+        scale = questionnaire_of(self.study, item)
+        if scale is None:
+            return questions_of(self.study, item)
+        repeats = sum(entry['entry'] == SessionEvent.REPEATED and entry['item'] == item.id
+                      for entry in self.journal.entries)
+        return scale.ordered(f'{self.study.seed} {self.participant} {item.id} {repeats}')
 
     def finish(self, answers: Mapping[str, object] | None = None, **told: object) -> SessionItem:
         """
@@ -143,8 +265,14 @@ class ParticipantSession:
             raise InputError('needs consent', item.id, 'agree, or end the session')
         if isinstance(item.what, PlannedTrial) and not self.attempts(item.id):
             raise InputError('has not begun', item.id, 'start it first')
-        taken = check_answers(self.questions(item), answers or {}, item.id)
+        shown = self.questions(item)
+        fields = None if isinstance(item.what, Fields) else self.fields
+        taken = check_answers(shown, answers or {}, item.id, fields)
+        asked = asked_of(shown, taken, fields)
+        if asked != questions_of(self.study, item):
+            told['asked'] = [question.name for question in asked]
         self._add(SessionEvent.FINISHED, item=item.id, answers=taken, **told)
+        self._settle()
         return item
 
     def practised(self, good: bool, **told: object) -> bool:
@@ -187,7 +315,13 @@ class ParticipantSession:
         """Skip the next item, for a reason."""
         if not reason.strip():
             raise InputError('needs a reason', self._now().id, 'say why it is left out')
-        self._add(SessionEvent.SKIPPED, item=self._now().id, reason=reason)
+        item = self._now()
+        groups = self.study.groups
+        if isinstance(item.what, Fields) and groups is not None and groups.deciding_fields:
+            raise InputError('decides on the group', item.id,
+                             'let it be answered, or end the session')
+        self._add(SessionEvent.SKIPPED, item=item.id, reason=reason)
+        self._settle()
 
     def repeat(self, item: str, reason: str) -> None:
         """
@@ -196,10 +330,11 @@ class ParticipantSession:
         With a trial, the questions after it are repeated too: they are about its last drive.
         """
         done = self.done
-        if item not in self._ids or item not in done:
+        found = next((each for each in self.items if each.id == item), None)
+        if found is None or item not in done:
             raise InputError('is not done', item[:60], 'name an item that is')
         self._add(SessionEvent.REPEATED, item=item, reason=reason)
-        what = self._ids[item].what
+        what = found.what
         if not isinstance(what, PlannedTrial):
             return
         for after in self.items:

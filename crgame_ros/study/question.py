@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Questions of a study, and checks of their answers."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 import math
 from typing import Annotated, Any, ClassVar
@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar
 from crgame_ros.errors import InputError, short
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Advice, Keyed, Listed, Within
+from crgame_ros.study.answer_condition import AnswerCondition, holds_for, is_one_of
 from crgame_ros.study.local_text import LocalText, Text
 from crgame_ros.study.names import ColumnName
 
@@ -223,6 +224,8 @@ class Question:
     :param kind: the kind of answer.
     :param ask: the displayed text.
     :param required: whether it has to be answered before the participant can continue.
+    :param when: it is asked only if this holds, of an earlier question or of a field.
+    :param expect: the answer of people who attend: it is an attention check.
     """
 
     FORM: ClassVar[Form] = Form(_SEE, first=('name', 'ask'))
@@ -231,6 +234,23 @@ class Question:
     kind: Annotated[QuestionKind, Keyed(KINDS, 'kind of answer')]
     ask: Annotated[Text, Advice('say what is asked')] = LocalText()
     required: bool = True
+    when: AnswerCondition | None = None
+    expect: object = None
+
+    def check(self) -> None:
+        """Refuse an expected answer that the question does not take."""
+        if self.expect is None:
+            return
+        if isinstance(self.kind, TextQuestion) or getattr(self.kind, 'several', False):
+            raise InputError('expects an answer that is compared with no other', 'expect',
+                             'let it be a number, or a choice of one')
+        expected = str(self.expect) if isinstance(self.kind, ChoiceQuestion) else self.expect
+        if refusal := self.kind.refusal(expected):
+            raise InputError(f'expects {short(self.expect)}', 'expect', refusal)
+
+    def failed(self, answer: Answer) -> bool:
+        """Return whether it is an attention check that an answer, or None, does not pass."""
+        return self.expect is not None and not is_one_of(answer, (self.expect,))
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -258,12 +278,32 @@ class Question:
         return self.kind.refusal(answer)
 
 
-def check_answers(questions: tuple[Question, ...], answers: Mapping[str, Any],
-                  where: str) -> dict[str, Answer]:
+def asked_of(questions: Sequence[Question], answers: Mapping[str, Any],
+             fields: Mapping[str, Any] | None = None) -> tuple[Question, ...]:
+    """
+    Return the questions whose conditions hold: those that the participant sees.
+
+    :param questions: in an order in which a condition is of an earlier one.
+    :param answers: by the question's name.
+    :param fields: of the participant; by default the questions are the fields themselves.
+    """
+    asked: list[Question] = []
+    taken: dict[str, Any] = {}
+    for question in questions:
+        if holds_for(question.when, taken, taken if fields is None else fields):
+            asked.append(question)
+            taken[question.name] = answers.get(question.name)
+    return tuple(asked)
+
+
+def check_answers(questions: Sequence[Question], answers: Mapping[str, Any], where: str,
+                  fields: Mapping[str, Any] | None = None) -> dict[str, Answer]:
     """
     Check the answers to some questions, and return them.
 
-    :param answers: by the question's name; a missing one counts as None.
+    :param answers: by the question's name; a missing one counts as None, and so does one to a
+        question whose condition does not hold.
+    :param fields: of the participant; by default the questions are the fields themselves.
     :return: an answer, or None, for each question in its order.
     :raises InputError: about the first answer that is refused.
     """
@@ -271,15 +311,34 @@ def check_answers(questions: tuple[Question, ...], answers: Mapping[str, Any],
     for name in answers:
         if name not in known:
             raise InputError(f'{short(name)} is no question', where, 'answer what is asked')
-    taken: dict[str, Answer] = {}
-    for question in questions:
+    taken: dict[str, Answer] = dict.fromkeys((question.name for question in questions), None)
+    for question in asked_of(questions, answers, fields):
         answer = answers.get(question.name)
-        refusal = question.refusal(answer)
-        if refusal:
+        if refusal := question.refusal(answer):
             raise InputError(f'is answered by {short(answer)}', f'{where}: {question.name}',
                              refusal)
         taken[question.name] = answer
     return taken
+
+
+def check_conditions(questions: Sequence[Question], *, are_fields: bool) -> None:
+    """
+    Refuse a condition that is not of an earlier question.
+
+    :param are_fields: whether the questions are the fields of the participant.
+    :raises InputError: naming the question.
+    """
+    earlier: list[str] = []
+    for question in questions:
+        when = question.when
+        name = None if when is None else when.question or (when.field if are_fields else None)
+        if name is not None and name not in earlier:
+            raise InputError(f'is asked by an answer to "{name}", which is no earlier question',
+                             f'{question.name}: when', f'name {", ".join(earlier) or "none"}')
+        if when is not None and when.questionnaire is not None:
+            raise InputError('has "questionnaire"', f'{question.name}: when',
+                             'leave it out: it is the same one')
+        earlier.append(question.name)
 
 
 def _finite(value: object) -> bool:

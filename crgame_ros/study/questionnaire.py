@@ -15,7 +15,8 @@ from crgame_ros.schema.marks import Listed
 from crgame_ros.schema.reading import read
 from crgame_ros.study.local_text import LocalText, Text
 from crgame_ros.study.names import ColumnName
-from crgame_ros.study.question import Answer, ChoiceQuestion, Question
+from crgame_ros.study.question import Answer, check_conditions, ChoiceQuestion, Question
+from crgame_ros.study.trial_order import shuffled
 from crgame_ros.yaml_text import read_yaml
 
 SCALES = Path(__file__).resolve().parent / 'scales'
@@ -100,6 +101,8 @@ class Questionnaire:
     :param text: shown before its questions.
     :param citation: its source.
     :param matrix: whether successive questions with the same points are rows of one table.
+    :param shuffle: whether their order is drawn for each participant and time; a question with a
+        condition on another one stays behind it.
     :param questions: in their order.
     :param scores: of the answers.
     """
@@ -112,10 +115,12 @@ class Questionnaire:
     text: Text = LocalText()
     citation: str = ''
     matrix: bool = False
+    shuffle: bool = False
     scores: Annotated[tuple[Score, ...], Listed(0, 50, 'score', 'name')] = ()
 
     def check(self) -> None:
-        """Refuse scores of unknown questions."""
+        """Refuse scores of unknown questions, and conditions on questions that are not before."""
+        check_conditions(self.questions, are_fields=False)
         known = {question.name: question for question in self.questions}
         for score in self.scores:
             for item in (*score.items, *score.flipped, *score.pairs):
@@ -131,6 +136,24 @@ class Questionnaire:
                         map(str, kind.choices)) <= set(score.items):
                     raise InputError(f'"{item}" does not choose between items',
                                      f'scores: {score.name}', 'let its choices be two items')
+
+    def ordered(self, draw: str) -> tuple[Question, ...]:
+        """
+        Return the questions in the order in which they are shown.
+
+        :param draw: unique name of this time; equal names give equal orders everywhere.
+        """
+        if not self.shuffle:
+            return self.questions
+        heads: dict[str, list[Question]] = {}
+        of_head: dict[str, str] = {}
+        for question in self.questions:
+            before = None if question.when is None else question.when.question
+            of_head[question.name] = question.name if before is None else of_head[before]
+            heads.setdefault(of_head[question.name], []).append(question)
+        groups = list(heads.values())
+        return tuple(question for place in shuffled(len(groups), draw)
+                     for question in groups[place])
 
     def score(self, answers: Mapping[str, Answer]) -> dict[str, float]:
         """Compute all scores of some answers; NaN if an answer is missing."""

@@ -16,6 +16,8 @@ from crgame_ros.errors import InputError, short
 from crgame_ros.whole_file import sync_folder
 
 JOURNAL = 'journal.jsonl'
+# The reason for ending a session without consent.
+DECLINED = 'consent was not given'
 
 
 class SessionEvent(StrEnum):
@@ -34,12 +36,15 @@ class SessionEvent(StrEnum):
     LANGUAGE = 'language'
     HELD = 'held'
     ENDED = 'ended'
+    ALLOCATED = 'allocated'
+    EXCLUDED = 'excluded'
 
 
 # Values that entries of a kind need.
 _NEEDED: dict[str, tuple[str, ...]] = {
     SessionEvent.BEGUN: ('participant', 'place', 'items'), SessionEvent.LANGUAGE: ('language',),
     SessionEvent.HELD: ('held', 'item'), SessionEvent.OPENED: ('software',),
+    SessionEvent.ALLOCATED: ('group', 'place', 'items'), SessionEvent.EXCLUDED: ('reason', 'item'),
     **dict.fromkeys((SessionEvent.STARTED, SessionEvent.FINISHED, SessionEvent.ABORTED,
                      SessionEvent.SKIPPED, SessionEvent.REPEATED, SessionEvent.PRACTISED),
                     ('item',))}
@@ -47,12 +52,12 @@ _NEEDED: dict[str, tuple[str, ...]] = {
 _TYPES: dict[str, type] = {
     'at': float, 'entry': str,
     **dict.fromkeys(('item', 'participant', 'language', 'run', 'name', 'text', 'reason',
-                     'outcome'), str),
-    **dict.fromkeys(('attempt', 'place', 'contacts', 'departures', 'drives'), int),
+                     'outcome', 'group', 'page'), str),
+    **dict.fromkeys(('attempt', 'place', 'contacts', 'departures', 'drives', 'slot'), int),
     **dict.fromkeys(('time_s', 'end_time_s', 'start_at', 'asked_at', 'shown_at', 'answered_at',
                      'taken_s', 'clean_s'), float),
-    **dict.fromkeys(('held', 'good'), bool), **dict.fromkeys(('items', 'doubts'), list),
-    **dict.fromkeys(('answers', 'software', 'after_s', 'quality', 'consent'), dict)}
+    **dict.fromkeys(('held', 'good'), bool), **dict.fromkeys(('items', 'doubts', 'asked'), list),
+    **dict.fromkeys(('answers', 'software', 'after_s', 'quality', 'consent', 'strata'), dict)}
 # Times of the wall clock are the largest numbers; until the year 5138 [s since 1970].
 _LARGEST = 1e11
 

@@ -4,9 +4,10 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 
 from crgame_ros.study.file import Block, Break, Practice, Step, StepEntry, StudyFile
-from crgame_ros.study.trial_plan import conditions_of, plan_trials, PlannedTrial
+from crgame_ros.study.trial_plan import conditions_of, drive_seed, plan_trials, PlannedTrial
 from crgame_ros.study.trial_settings import drawn, laid, TrialSettings
 
 
@@ -43,32 +44,39 @@ class SessionItem:
     trial: int | None = None
 
 
-def session_of(study: StudyFile, place: int) -> tuple[SessionItem, ...]:
+def items_before_groups(study: StudyFile) -> tuple[SessionItem, ...]:
+    """Return the items that come before a participant's group is known."""
+    return (*((SessionItem('fields', Fields()),) if study.fields else ()),
+            *_steps('before', study.before))
+
+
+def session_of(study: StudyFile, place: int, group: str = '') -> tuple[SessionItem, ...]:
     """
     Return the session of a participant.
 
-    :param place: among all participants, from 0 on.
+    :param place: among all participants, or in the group, from 0 on.
+    :param group: of the participant; empty in a study without groups.
     :raises InputError: if the study cannot be planned.
     """
-    items: list[SessionItem] = [SessionItem('fields', Fields())] if study.fields else []
-    items += _steps('before', study.before)
-    trials = plan_trials(study, place)
+    items = list(items_before_groups(study))
+    trials = plan_trials(study, place, group)
     for block in study.blocks:
-        items += _block(study, block, place,
+        items += _block(study, block, place, group,
                         [trial for trial in trials if trial.block == block.name])
-    items += _steps('after', study.after)
+    items += _steps('after', study.after, group=group)
     return tuple(items)
 
 
 def drives_of(study: StudyFile) -> Iterator[tuple[str, TrialSettings]]:
     """Yield names and settings of all practices and conditions of a study, each once."""
-    for block in study.blocks:
+    for group, block in product(study.group_names, study.blocks):
+        name = f'{group}: {block.name}' if group else block.name
+        conditions = conditions_of(study, block, group)
         if block.practice is not None:
-            first = conditions_of(study, block)[0].settings
-            settings = laid(study.settings, block.settings, block.practice.settings)
-            yield f'{block.name}: practice', placed(settings, first)
-        for condition in conditions_of(study, block):
-            yield f'{block.name}: {condition.name}', condition.settings
+            yield f'{name}: practice', placed(_practice_settings(study, block, block.practice,
+                                                                 group), conditions[0].settings)
+        for condition in conditions:
+            yield f'{name}: {condition.name}', condition.settings
 
 
 def placed(settings: TrialSettings, trial: TrialSettings) -> TrialSettings:
@@ -78,25 +86,32 @@ def placed(settings: TrialSettings, trial: TrialSettings) -> TrialSettings:
     return replace(settings, game=trial.game, scenario=trial.scenario)
 
 
-def _block(study: StudyFile, block: Block, place: int,
+def _practice_settings(study: StudyFile, block: Block, practice: Practice,
+                       group: str) -> TrialSettings:
+    return laid(study.settings, block.settings, study.group_settings(group), practice.settings)
+
+
+def _block(study: StudyFile, block: Block, place: int, group: str,
            trials: list[PlannedTrial]) -> Iterator[SessionItem]:
-    yield from _steps(f'{block.name}/before', block.before)
+    yield from _steps(f'{block.name}/before', block.before, group=group)
     if block.practice is not None:
-        settings = drawn(laid(study.settings, block.settings, block.practice.settings),
-                         f'{study.seed} {place} practice {block.name}')
+        settings = drawn(_practice_settings(study, block, block.practice, group),
+                         f'{drive_seed(study, place, group)} practice {block.name}')
         if trials:
             settings = placed(settings, trials[0].condition.settings)
         yield SessionItem(f'{block.name}/practice', PracticeDrives(block.practice, settings))
     for trial in trials:
         name = f'{block.name}/{trial.place}'
         yield SessionItem(name, trial)
-        yield from _steps(f'{name}/after', block.after_trial, trial.number)
+        yield from _steps(f'{name}/after', block.after_trial, trial.number, group)
         if block.break_every and trial.place % block.break_every == 0 and trial != trials[-1]:
             yield SessionItem(f'{name}/break', Break(block.break_minutes))
-    yield from _steps(f'{block.name}/after', block.after)
+    yield from _steps(f'{block.name}/after', block.after, group=group)
 
 
 def _steps(name: str, steps: tuple[StepEntry, ...],
-           trial: int | None = None) -> Iterator[SessionItem]:
+           trial: int | None = None, group: str = '') -> Iterator[SessionItem]:
     for number, entry in enumerate(steps):
-        yield SessionItem(f'{name}/{number + 1}', entry.step, trial)
+        # The numbers in the ids are those of the file, the same for all groups.
+        if not entry.groups or group in entry.groups:
+            yield SessionItem(f'{name}/{number + 1}', entry.step, trial)

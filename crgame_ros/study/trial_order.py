@@ -33,7 +33,7 @@ def rows_of(kind: OrderKind, count: int) -> int:
 
 
 def order_of(kind: OrderKind, count: int, seed: int, place: int, pass_number: int = 0,
-             sequences: Sequence[Sequence[int]] = ()) -> list[int]:
+             sequences: Sequence[Sequence[int]] = (), group: str = '') -> list[int]:
     """
     Return the order of conditions in one pass through a block.
 
@@ -41,9 +41,10 @@ def order_of(kind: OrderKind, count: int, seed: int, place: int, pass_number: in
         seed has shuffled; `random` shuffles for each participant and pass; `given` is the file's.
     :param count: of conditions.
     :param seed: of the study.
-    :param place: of the participant, from 0 on.
+    :param place: of the participant, from 0 on; of the group, if there are groups.
     :param pass_number: number of the repetition of the block, from 0 on.
     :param sequences: if any, assigned to participants in turn instead of any kind of order.
+    :param group: of the participant: groups take the same squares, and shuffle each for itself.
     :return: a permutation of 0 … count - 1, or a sequence.
     """
     if sequences:
@@ -51,7 +52,7 @@ def order_of(kind: OrderKind, count: int, seed: int, place: int, pass_number: in
     if kind == 'given':
         return list(range(count))
     if kind == 'random':
-        return shuffled(count, f'{seed} {place} {pass_number}')
+        return shuffled(count, ' '.join(filter(None, (f'{seed} {place} {pass_number}', group))))
     rows = williams_rows(count)
     names = shuffled(count, f'{seed}')
     # Each pass uses the next row, so that a participant does not always start with the same one.

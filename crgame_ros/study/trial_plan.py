@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plans a participant's trials in order, with crossed conditions and combined settings."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -48,37 +49,62 @@ class PlannedTrial:
     condition: Condition
 
 
-def conditions_of(study: StudyFile, block: Block) -> tuple[Condition, ...]:
-    """Return the crossed levels of a block's factors; the last factor changes fastest."""
+def conditions_of(study: StudyFile, block: Block, group: str = '') -> tuple[Condition, ...]:
+    """
+    Return the crossed levels of a block's factors; the last factor changes fastest.
+
+    :param group: whose settings they have, over those of the block; its level is not in the name.
+    """
     factors = study.factors_of(block)
     return tuple(
         Condition(tuple((factor.name, level) for factor, level in
                         zip(factors, levels, strict=True)),
-                  laid(study.settings, block.settings, *(level.settings for level in levels)))
+                  laid(study.settings, block.settings, study.group_settings(group),
+                       *(level.settings for level in levels)))
         for levels in product(*(factor.levels for factor in factors)))
 
 
-def plan_trials(study: StudyFile, place: int) -> tuple[PlannedTrial, ...]:
+def plan_trials(study: StudyFile, place: int, group: str = '') -> tuple[PlannedTrial, ...]:
     """
     Plan all trials of a participant.
 
-    :param place: of the participant among all, from 0 on.
+    :param place: of the participant among all, or in the group, from 0 on.
+    :param group: of the participant; empty in a study without groups.
     :raises InputError: if a block's sequence names an unknown condition.
     """
     trials: list[PlannedTrial] = []
     for block in study.blocks:
-        conditions = conditions_of(study, block)
+        conditions = conditions_of(study, block, group)
         sequences = _sequences(block, [condition.name for condition in conditions])
         in_block = 0
         for repetition in range(block.repetitions):
             for index in order_of(block.order, len(conditions), study.seed, place, repetition,
-                                  sequences):
+                                  sequences, group):
                 in_block += 1
                 number, condition = len(trials) + 1, conditions[index]
-                settings = drawn(condition.settings, f'{study.seed} {place} trial {number}')
+                settings = drawn(condition.settings,
+                                 f'{drive_seed(study, place, group)} trial {number}')
                 trials.append(PlannedTrial(number, block.name, in_block, repetition + 1,
                                            replace(condition, settings=settings)))
     return tuple(trials)
+
+
+def orders_of(study: StudyFile,
+              places: int) -> Iterator[tuple[str, tuple[PlannedTrial, ...]]]:
+    """
+    Yield names and trials of the first places in the orders, of each group if there are groups.
+
+    :param places: their number, of each group.
+    :raises InputError: if the study cannot be planned.
+    """
+    for group, place in product(study.group_names, range(places)):
+        name = f'{group}, place {place + 1}' if group else f'participant {place + 1}'
+        yield name, plan_trials(study, place, group)
+
+
+def drive_seed(study: StudyFile, place: int, group: str) -> str:
+    """Return the beginning of the names by which seeds of a participant's drives are drawn."""
+    return ' '.join(filter(None, (f'{study.seed} {place}', group)))
 
 
 def _sequences(block: Block, names: list[str]) -> list[list[int]]:

@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
 import { Draft } from '../../page/desk/js/draft.js';
-import { questionForm } from '../../page/desk/js/question_form.js';
+import { holds, questionForm } from '../../page/desk/js/question_form.js';
 import { Words } from '../../page/desk/js/words.js';
 import { click, expose, openPage, send, textOf } from './dom_support.mjs';
 
@@ -18,7 +18,7 @@ const TABLE = { next: 'Next', missing: 'Please answer', missing_one: 'One is mis
   number_any: 'A number', number_any_whole: 'A whole number',
   text_long: '{longest} at most; these are {count}' };
 const asked = (kind, more) => ({ name: kind, kind, ask: `What of ${kind}?`, required: true,
-  ...more });
+  when: null, ...more });
 const LIKERT = asked('likert', { points: 5, left: 'never', right: 'always', labels: [] });
 const SLIDER = asked('slider', { low: 0, high: 100, step: 5, left: 'awake', right: 'tired' });
 const CHOICE = asked('choice', { several: false, choices: [['yes', 'Yes'], ['no', 'No, <b>']] });
@@ -299,4 +299,58 @@ test('successive questions on one scale are rows of a table, and answered as any
   type('slider', '30');
   goOn();
   assert.deepEqual(told[0].answers, { a: 3, b: 3, slider: 30, c: 3, d: 3, e: 3 });
+});
+
+const when = (question, test = {}) => ({ question, one_of: [], at_least: null, below: null,
+  ...test });
+const asks = (name) => !question(name).hidden;
+
+test('a question is asked while its condition holds, and only its answer then is sent', async () => {
+  ask(CHOICE, { ...NUMBER, when: when('choice', { one_of: ['yes'] }) },
+    { ...TEXT, when: when('number', { at_least: 50 }) }, LIKERT);
+  const asking = () => ['choice', 'number', 'text', 'likert'].filter(asks);
+  assert.deepEqual(asking(), ['choice', 'likert']);
+  await click(inputs('choice')[0]);
+  assert.deepEqual(asking(), ['choice', 'number', 'likert']);
+  type('number', '60');
+  assert.deepEqual(asking(), ['choice', 'number', 'text', 'likert']);
+  // What is asked has to be answered.
+  await goOn();
+  assert.deepEqual([problem('text'), summary(), told.length],
+    ['Please answer', '2 are missing', 0]);
+  type('text', 'word');
+  // With its question, an answer goes, and so does what depends on it.
+  await click(inputs('choice')[1]);
+  assert.deepEqual(asking(), ['choice', 'likert']);
+  await click(inputs('likert')[2]);
+  await goOn();
+  assert.deepEqual(told[0].answers, { choice: 'no', likert: 3 });
+});
+
+test('after a reload the questions are asked that were asked before', async () => {
+  const shown = [CHOICE, { ...NUMBER, when: when('choice', { one_of: ['yes'] }) }];
+  ask(...shown);
+  await click(inputs('choice')[0]);
+  ask(...shown);
+  assert.equal(asks('number'), true);
+});
+
+test('a table whose rows are all left out shows no head', async () => {
+  const row = (name) => ({ ...LIKERT, name, when: when('choice', { one_of: ['yes'] }) });
+  const shown = { title: '', text: '', matrix: true, questions: [CHOICE, row('a'), row('b')] };
+  root.replaceChildren(questionForm(shown, words, new Draft('m', () => now_s), () => {}));
+  assert.equal(find('.matrix').hidden, true);
+  await click(inputs('choice')[0]);
+  assert.equal(find('.matrix').hidden, false);
+});
+
+test('conditions hold as the server says', () => {
+  const cases = [[{ one_of: ['yes'] }, 'yes', true], [{ one_of: ['yes'] }, null, false],
+    [{ one_of: ['a'] }, ['b', 'a'], true], [{ one_of: ['a'] }, [], false],
+    [{ one_of: [3, 4] }, 4, true], [{ one_of: [3] }, 4, false], [{ one_of: ['3'] }, 3, false],
+    [{ one_of: [3] }, '3', true], [{ at_least: 3 }, 3, true], [{ below: 3 }, 3, false],
+    [{ at_least: 1, below: 3 }, 2, true], [{ at_least: 1 }, 'yes', false]];
+  for (const [test_, answer, expected] of cases) {
+    assert.equal(holds(when('q', test_), answer), expected, JSON.stringify([test_, answer]));
+  }
 });

@@ -33,15 +33,17 @@ class SessionRequest:
     :param study: its study.
     :param folder: of the participant.
     :param participant: anonymous id.
-    :param place: among all participants, from 0 on.
     :param port: of the pages; the cockpit takes a later one.
+    :param place: among all participants, from 0 on; by default the next free one.
+    :param group: that the experimenter gives.
     """
 
     study: StudyFile
     folder: Path
     participant: str
-    place: int
     port: int
+    place: int | None = None
+    group: str | None = None
 
 
 def conduct(request: SessionRequest, say: Callable[[str], None]) -> bool:
@@ -53,7 +55,9 @@ def conduct(request: SessionRequest, say: Callable[[str], None]) -> bool:
     :raises CrgameError: if it cannot begin, or another process has the participant's session.
     """
     with ParticipantSession(request.study, request.folder, request.participant,
-                            request.place) as session:
+                            request.place, group=request.group) as session:
+        say(f'{request.participant}, place {session.place + 1} of {request.study.name}; data go '
+            f'to {request.folder}')
         if session.next_item is None:
             say(f'{request.participant} is done: nothing is left')
             return True

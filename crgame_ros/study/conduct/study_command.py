@@ -44,6 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                      help="folder of the study's data (default: studies/NAME)")
     run.add_argument('--place', type=int, metavar='N',
                      help='place in the orders, from 1 on (default: the next free one)')
+    run.add_argument('--group', metavar='NAME', help='of a new participant, in a study whose '
+                     'groups the experimenter gives')
     run.add_argument('--port', type=int, default=8090, metavar='P',
                      help='port of the pages (default: 8090, or the next free one)')
     run.set_defaults(command=run_command)
@@ -92,7 +94,7 @@ def check_command(values: argparse.Namespace) -> int:
     from crgame_ros.study.conduct.plan_commands import check_planned_measures
     from crgame_ros.study.data.study_data_command import told_overdue
     from crgame_ros.study.file import load_study
-    from crgame_ros.study.trial_plan import plan_trials
+    from crgame_ros.study.trial_plan import orders_of
     if not 0 <= values.participants <= 10_000:
         raise InputError(f'is {values.participants}', '--participants', 'give 0 to 10000')
     study = load_study(values.file)
@@ -105,9 +107,11 @@ def check_command(values: argparse.Namespace) -> int:
         say(f'{finding.kind}: {finding.text}')
     if any(finding.kind == 'error' for finding in findings):
         return 1
-    for place in range(values.participants):
-        print(f'participant {place + 1}:')
-        for trial in plan_trials(study, place):
+    if study.groups is not None:
+        print(f'groups by {study.groups.name}: {study.groups.told}')
+    for name, trials in orders_of(study, values.participants):
+        print(f'{name}:')
+        for trial in trials:
             print(f'  {trial.number:3}  {trial.block}  {trial.condition.name}')
     length = length_of(study)
     print(f'a session takes about {(length.driving_s + length.else_s) / 60.0:.0f} min, '
@@ -135,13 +139,15 @@ def run_command(values: argparse.Namespace) -> int:
         raise InputError(f'is {values.port}', '--port', 'give 1 to 65000')
     if values.place is not None and not 1 <= values.place <= 10_000:
         raise InputError(f'is {values.place}', '--place', 'give 1 to 10000')
+    if values.place is not None and study.groups is not None:
+        raise InputError(f'is {values.place}, but the group decides on the place', '--place',
+                         'leave it out')
     folder = StudyFolder(values.out or Path('studies') / study.name)
     folder.begin(participant)
     folder.keep_study(study, values.file, pictures_of(study))
-    place = folder.place_of(participant) if values.place is None else values.place - 1
-    print_now(f'{participant}, place {place + 1} of {study.name}; data go to {folder.root}')
-    over = conduct(SessionRequest(study, folder.participant(participant).resolve(), participant,
-                                  place, values.port), print_now)
+    over = conduct(SessionRequest(
+        study, folder.participant(participant).resolve(), participant, values.port,
+        None if values.place is None else values.place - 1, values.group), print_now)
     print_now(f'{participant} is done' if over
               else f'{participant} goes on with the same command')
     return 0

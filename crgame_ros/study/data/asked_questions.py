@@ -18,7 +18,6 @@ from crgame_ros.study.file import Questions, StudyFile
 from crgame_ros.study.pages import questionnaire_name
 from crgame_ros.study.questionnaire import load_questionnaire, Questionnaire
 from crgame_ros.study.session_script import session_of, SessionItem
-from crgame_ros.study.trial_plan import PlannedTrial
 
 
 @dataclass(frozen=True)
@@ -96,14 +95,11 @@ def _place(item: str) -> str:
 def _questions(study: StudyFile) -> Iterator[tuple[SessionItem, Questions, int]]:
     """Yield the items with questionnaires, and how often each was asked before at that point."""
     seen: dict[tuple[str, str], int] = {}
-    for item in session_of(study, 0):
+    # A step may be only for some groups; equal ids are the same step.
+    items = {item.id: item for group in study.group_names
+             for item in session_of(study, 0, group)}
+    for item in items.values():
         if isinstance(item.what, Questions):
             place = _place(item.id), item.what.name
             yield item, item.what, seen.get(place, 0)
             seen[place] = seen.get(place, 0) + 1
-
-
-def trials_by_number(items: Mapping[str, SessionItem]) -> dict[int, PlannedTrial]:
-    """Return the trials of a session by their numbers."""
-    return {item.what.number: item.what for item in items.values()
-            if isinstance(item.what, PlannedTrial)}

@@ -3,6 +3,7 @@
 """The folder of a started or finished study: its file, participants and data."""
 
 from collections.abc import Iterator
+import json
 from pathlib import Path
 
 from crgame_ros.errors import InputError
@@ -39,8 +40,14 @@ class ConductedStudy:
     @property
     def withdrawals(self) -> int:
         """Return the number of participants whose data were deleted."""
+        return len(self.withdrawn_groups)
+
+    @property
+    def withdrawn_groups(self) -> list[str]:
+        """Return the group of each withdrawn participant; an empty name for none."""
         log = self.path / WITHDRAWALS
-        return len(log.read_text('utf-8').splitlines()) if log.is_file() else 0
+        lines = log.read_text('utf-8').splitlines() if log.is_file() else ()
+        return [json.loads(line).get('group', '') for line in lines]
 
     def participants(self) -> list[ParticipantRecord]:
         """

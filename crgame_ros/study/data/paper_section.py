@@ -41,8 +41,13 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
         # As noted by the sessions: more than one if it changed during the study.
         'sessions_run_by': {record.id: record.software for record in data.records},
         'withdrawals': folder.withdrawals,
-        'conditions': {f'{block.name}: {condition.name}': _plain(write(condition.settings))
-                       for block in study.blocks for condition in conditions_of(study, block)},
+        'groups': None if study.groups is None else {
+            'factor': study.groups.name, 'names': list(study.groups.names),
+            'allocation': study.groups.told},
+        'conditions': {': '.join(filter(None, (group, block.name, condition.name))):
+                       _plain(write(condition.settings))
+                       for group in study.group_names for block in study.blocks
+                       for condition in conditions_of(study, block, group)},
         'random_seeds': sorted({row['random_seed'] for row in _rows(data)
                                 if row.get('random_seed') is not None}),
         'questionnaires': [{
@@ -128,6 +133,9 @@ def _study(data: StudyData, told: Mapping[str, Any]) -> Iterator[Sequence[str]]:
     registered = data.folder.path / PREREGISTRATION
     if registered.is_file():
         yield 'Preregistration', _registered(data, registered)
+    if study.groups is not None:
+        yield 'Groups', plain(f'{study.groups.name} ({", ".join(study.groups.names)}), by '
+                              f'{study.groups.told}')
     yield 'Seed of the orders', plain(study.seed)
     yield 'Seeds of the drives', plain(', '.join(map(str, told['random_seeds'])) or 'none yet')
     for block in study.blocks:

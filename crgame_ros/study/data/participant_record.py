@@ -9,14 +9,18 @@ from pathlib import Path
 from typing import Any, Literal
 
 from crgame_ros.errors import InputError
+from crgame_ros.study.enrolment import allocation_of
 from crgame_ros.study.file import StudyFile
+from crgame_ros.study.given_answers import failed_checks, last_answers
+from crgame_ros.study.groups import Allocation
 from crgame_ros.study.pages import questions_of
 from crgame_ros.study.question import Answer
-from crgame_ros.study.session_journal import read_journal, SessionEvent
-from crgame_ros.study.session_script import session_of, SessionItem
+from crgame_ros.study.session_journal import DECLINED, read_journal, SessionEvent
+from crgame_ros.study.session_script import items_before_groups, session_of, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 
 Ending = Literal['finished', 'aborted', 'lost', 'open']
+Part = Literal['completed', 'excluded', 'declined', 'ended', 'under way']
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,7 @@ class ParticipantRecord:
     :param study: of the session.
     :param items: of the session.
     :param entries: of the journal.
+    :param allocation: to a group; None before it, and in a study without groups.
     """
 
     id: str  # noqa: A003
@@ -88,6 +93,7 @@ class ParticipantRecord:
     study: StudyFile
     items: Mapping[str, SessionItem]
     entries: tuple[Mapping[str, Any], ...]
+    allocation: Allocation | None = None
 
     @cached_property
     def attempts(self) -> tuple[TrialAttempt, ...]:
@@ -99,8 +105,11 @@ class ParticipantRecord:
         """
         Return the attempts that count, by item: the last finished ones.
 
-        An item that was skipped in the end does not count, even if it was driven before.
+        An item that was skipped in the end does not count, even if it was driven before. Nothing
+        counts of a participant who was excluded.
         """
+        if self.exclusion is not None:
+            return {}
         found = {each.item: each for each in self.attempts if each.ending == 'finished'}
         for entry in self.entries:
             if entry['entry'] == SessionEvent.SKIPPED:
@@ -170,7 +179,9 @@ class ParticipantRecord:
 
     @property
     def complete(self) -> bool:
-        """Return whether every item is finished or skipped."""
+        """Return whether every item is finished or skipped, and no rule has excluded anybody."""
+        if self.exclusion is not None or self._awaits_group:
+            return False
         done: set[str] = set()
         for entry in self.entries:
             if entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
@@ -178,6 +189,44 @@ class ParticipantRecord:
             elif entry['entry'] == SessionEvent.REPEATED:
                 done.discard(entry['item'])
         return done >= self.items.keys()
+
+    @property
+    def group(self) -> str:
+        """Return the name of the participant's group; empty without one."""
+        return '' if self.allocation is None else self.allocation.group
+
+    @property
+    def _awaits_group(self) -> bool:
+        return self.study.groups is not None and self.allocation is None
+
+    @property
+    def exclusion(self) -> Mapping[str, Any] | None:
+        """Return the entry by which a rule has excluded the participant; None without one."""
+        return next((entry for entry in self.entries
+                     if entry['entry'] == SessionEvent.EXCLUDED), None)
+
+    @property
+    def part(self) -> Part:
+        """Return the participant's part in the study: how far it went, or how it ended."""
+        if self.exclusion is not None:
+            return 'excluded'
+        ended = next((entry for entry in self.entries
+                      if entry['entry'] == SessionEvent.ENDED), None)
+        if ended is not None:
+            return 'declined' if ended.get('reason') == DECLINED else 'ended'
+        return 'completed' if self.complete else 'under way'
+
+    @property
+    def failed_checks(self) -> list[str]:
+        """Return the attention checks that failed, as item and question."""
+        return failed_checks(self.study, self.items.values(), last_answers(self.entries))
+
+    @property
+    def trials_planned(self) -> int:
+        """Return the number of trials in the session; of the first group before an allocation."""
+        items = session_of(self.study, 0, self.study.group_names[0]) if self._awaits_group \
+            else self.items.values()
+        return sum(isinstance(item.what, PlannedTrial) for item in items)
 
     @property
     def language(self) -> str | None:
@@ -238,9 +287,19 @@ def read_participant(study: StudyFile, folder: Path) -> ParticipantRecord | None
     begun = next((entry for entry in entries if entry['entry'] == SessionEvent.BEGUN), None)
     if begun is None:
         return None
-    items = session_of(study, begun['place'])
-    if [item.id for item in items] != begun['items']:
+    allocated = next((entry for entry in entries
+                      if entry['entry'] == SessionEvent.ALLOCATED), None)
+    allocation = None if allocated is None else allocation_of(allocated)
+    if allocation is not None and allocated is not None:
+        fits = allocation.group in study.group_names
+        items = session_of(study, allocation.place, allocation.group) if fits else ()
+        noted = allocated['items']
+    else:
+        items = session_of(study, begun['place']) if study.groups is None \
+            else items_before_groups(study)
+        noted = begun['items']
+    if [item.id for item in items] != noted:
         raise InputError('began with another plan than that of the study file', str(folder),
                          'put back the study file that the sessions were run with')
     return ParticipantRecord(begun['participant'] or folder.name, begun['place'], folder, study,
-                             {item.id: item for item in items}, entries)
+                             {item.id: item for item in items}, entries, allocation)

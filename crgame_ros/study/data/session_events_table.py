@@ -15,7 +15,8 @@ from crgame_ros.study.trial_plan import PlannedTrial
 
 # Entries of the journal with other names here.
 _OF_SESSION = {SessionEvent.BEGUN: 'session_begun', SessionEvent.OPENED: 'program_started',
-               SessionEvent.ENDED: 'session_ended'}
+               SessionEvent.ENDED: 'session_ended', SessionEvent.ALLOCATED: 'group_allocated',
+               SessionEvent.EXCLUDED: 'participant_excluded'}
 _OF_ITEM = (SessionEvent.STARTED, SessionEvent.FINISHED, SessionEvent.ABORTED,
             SessionEvent.SKIPPED, SessionEvent.REPEATED)
 GAME_EVENT = 'game_event'
@@ -27,7 +28,7 @@ EVENTS_OF_SESSIONS = TableDeclaration('events', 'something that happened', (
         Column('item', TEXT, '', 'of the session', empty='it is of none'),
         Column('trial', INTEGER, '1', 'during which, or of which, it was', empty='of none'),
         Column('attempt', INTEGER, '1', 'at the trial', empty='of none'),
-        Column('name', TEXT, '', 'of a marker, a game event, a task or an outcome',
+        Column('name', TEXT, '', 'of a marker, a game event, a task, an outcome or a group',
                empty='it has none'),
         Column('text', TEXT, '', 'a reason, a note, outcome of a task, or whether practice was '
                'good',
@@ -70,7 +71,7 @@ def _journal_rows(record: ParticipantRecord) -> Iterator[dict[str, Any]]:
         driven = item is not None and isinstance(item.what, PlannedTrial)
         row = {'kind': _kind(kind, item),
                'item': None if item is None else item.id, 'wall_s': float(entry['at']),
-               'name': entry.get('name') or entry.get('outcome') or None,
+               'name': entry.get('name') or entry.get('outcome') or entry.get('group') or None,
                'text': entry.get('text') or entry.get('reason') or None,
                'recording': entry.get('run') or None, 'time_s': entry.get('time_s')}
         if driven and item is not None and isinstance(item.what, PlannedTrial):

@@ -3,7 +3,7 @@
 """The data of a study so far, as tables that can be rewritten while it goes on."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import fcntl
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from crgame_ros.errors import CrgameError
 from crgame_ros.recording.finish import finish_run
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK
-from crgame_ros.study.data.asked_questions import AskedQuestions, plain_answer, trials_by_number
+from crgame_ros.study.data.asked_questions import AskedQuestions, plain_answer
 from crgame_ros.study.data.conducted_study import ConductedStudy
 from crgame_ros.study.data.participant_record import AnsweredItem, ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.run_tables import RunTables, RunTablesCache
@@ -27,7 +27,7 @@ from crgame_ros.study.data.study_row_table import (
     table_of_rows,
     unlike,
 )
-from crgame_ros.study.data.trials_table import PARTICIPANT, TrialsTable, utc, WALL
+from crgame_ros.study.data.trials_table import PARTICIPANT, PLACE_IN_GROUP, TrialsTable, utc, WALL
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.session_journal import JOURNAL, SessionEvent
 from crgame_ros.study.session_script import Fields
@@ -51,6 +51,13 @@ _PARTICIPANT_COLUMNS = (
            empty='nothing was agreed to'),
     Column('consent_language', TEXT, '', 'in which it was read', empty='nothing was agreed to'),
     flag_column('complete', 'whether everything of the session is finished or left out'),
+    Column('attention_failed', INTEGER, '1', 'attention checks that were answered otherwise than '
+           'expected'),
+    flag_column('excluded', 'whether a rule of the study has excluded the participant, whose '
+                'trials do not count'),
+    Column('excluded_reason', TEXT, '', 'the rule', empty='it was not'),
+    Column('excluded_at', TEXT, '', 'item of the session whose answers decided',
+           empty='likewise'),
     Column('end_reason', TEXT, '', 'why the session was ended early', empty='it was not'))
 
 
@@ -60,38 +67,50 @@ class ParticipantsTable:
 
     :param study: the study.
     :param asked: its questionnaires.
+    :ivar group: column of the group; None without groups.
     """
 
     def __init__(self, study: StudyFile, asked: AskedQuestions) -> None:
-        self._asked = asked
+        self._study, self._asked = study, asked
         answers = [column for scale in asked.else_where.values()
                    for column in scale.columns(study.language)]
-        taken = {column.name for column in (*_PARTICIPANT_COLUMNS, *answers)}
+        taken = {column.name for column in (*_PARTICIPANT_COLUMNS, PLACE_IN_GROUP, *answers)}
         self._fields: dict[str, Column] = {}
         for question in study.fields:
             name = unlike(question.name, taken, '_field')
             taken.add(name)
             self._fields[question.name] = question_column(question, name, study.language)
+        self.group: Column | None = None
+        if study.groups is not None:
+            self.group = Column(unlike(study.groups.name, taken, '_group'), TEXT, '',
+                                f'group of the participant: {study.groups.name}',
+                                empty='it was not known yet', values=study.groups.names)
+        grouped = () if self.group is None else (
+            self.group, replace(PLACE_IN_GROUP, empty='likewise'))
         self.declaration = TableDeclaration(
             'participants', 'a participant who has begun', ('participant',),
-            (*_PARTICIPANT_COLUMNS, *self._fields.values(), *answers))
+            (*_PARTICIPANT_COLUMNS, *grouped, *self._fields.values(), *answers))
 
     @property
     def fields(self) -> list[Column]:
         """Return the columns of the questions to each participant at the start."""
         return list(self._fields.values())
 
-    def row(self, record: ParticipantRecord, trials_planned: int) -> dict[str, object]:
+    def row(self, record: ParticipantRecord) -> dict[str, object]:
         """Return a participant's row."""
         runs = {Path(entry['run']).parts[:2] for entry in record.entries
                 if entry.get('run')}
         row = {'participant': record.id, 'place': record.place + 1, 'language': record.language,
                'begun': utc(record.begun_at), 'begun_s': record.begun_at,
                'ended': utc(record.ended_at), 'ended_s': record.ended_at, 'sessions': len(runs),
-               'trials': len(record.counted), 'trials_planned': trials_planned,
+               'trials': len(record.counted), 'trials_planned': record.trials_planned,
                'complete': record.complete, **_consent(record),
+               **_excluded(record),
                'end_reason': next((entry.get('reason') for entry in record.entries
                                    if entry['entry'] == SessionEvent.ENDED), None)}
+        if self.group is not None and record.allocation is not None:
+            row |= {self.group.name: record.group,
+                    PLACE_IN_GROUP.name: record.allocation.place + 1}
         for answered in record.answered:
             scale = self._asked.find(answered.item)
             if isinstance(answered.item.what, Fields):
@@ -100,6 +119,12 @@ class ParticipantsTable:
             elif answered.item.trial is None and scale is not None:
                 row |= scale.values(answered.answers)
         return row
+
+
+def _excluded(record: ParticipantRecord) -> dict[str, object]:
+    exclusion = record.exclusion or {}
+    return {'excluded': record.exclusion is not None, 'excluded_reason': exclusion.get('reason'),
+            'excluded_at': exclusion.get('item'), 'attention_failed': len(record.failed_checks)}
 
 
 def _consent(record: ParticipantRecord) -> dict[str, object]:
@@ -120,6 +145,9 @@ ANSWERS = TableDeclaration('answers', 'a question that was put', (
         Column('questionnaire', TEXT, '', 'name of its questionnaire',
                empty='it is a field of the participant'),
         Column('question', TEXT, '', 'name of the question'),
+        Column('position', INTEGER, '1', 'among the questions of its page that were asked, in the '
+               'order in which they were shown, from 1 on',
+               empty='it was not asked: its condition did not hold'),
         Column('number', NUMBER, '1', 'the answer, where it is a number',
                empty='it is a text, or none was given'),
         Column('text', TEXT, '', 'the answer, where it is a text: to the last character',
@@ -147,12 +175,14 @@ def answer_rows(record: ParticipantRecord, asked: AskedQuestions) -> Iterator[di
         scale = asked.find(answered.item)
         times = _times(record, answered)
         after_s = answered.told.get('after_s') or {}
+        asked_names = answered.told.get('asked') or answered.answers
+        positions = {name: place for place, name in enumerate(asked_names, 1)}
         for question, answer in answered.answers.items():
             value = plain_answer(answer)
             yield {'participant': record.id, 'item': answered.item.id,
                    'trial': answered.item.trial, 'attempt': answered.attempt,
                    'questionnaire': None if scale is None else scale.scale.name,
-                   'question': question,
+                   'question': question, 'position': positions.get(question),
                    'number' if isinstance(value, int | float) else 'text': value,
                    'answered': utc(answered.at), 'answered_s': answered.at, **times,
                    'after_s': after_s.get(question)}
@@ -300,7 +330,7 @@ def read_study_data(folder: ConductedStudy, say: Callable[[str], object],
     data.tables = {
         'trials': table_of_rows(data.trials_table.declaration, (each.row for each in data.trials)),
         'participants': table_of_rows(people.declaration, (
-            people.row(record, len(trials_by_number(record.items))) for record in records)),
+            people.row(record) for record in records)),
         'answers': table_of_rows(ANSWERS, _answers(data)),
         'events': table_of_rows(EVENTS_OF_SESSIONS, events)}
     return data

@@ -11,6 +11,7 @@ from crgame_ros.analysis.report.section import Section
 from crgame_ros.analysis.report.text import free, marked, note, NOTHING, number, plain, table
 from crgame_ros.study.data.condition_section import condition_section
 from crgame_ros.study.data.paper_section import paper_section
+from crgame_ros.study.data.participant_flow import flow_table
 from crgame_ros.study.data.planned_section import planned_section
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
 from crgame_ros.whole_file import write_text
@@ -20,7 +21,8 @@ _TROUBLES = {
     'trial_aborted': 'trial aborted', 'trial_skipped': 'trial left out',
     'trial_repeated': 'trial repeated', 'practice_skipped': 'practice left out',
     'practice_aborted': 'practice aborted', 'item_skipped': 'left out',
-    'item_repeated': 'asked again', 'session_ended': 'session ended early'}
+    'item_repeated': 'asked again', 'session_ended': 'session ended early',
+    'participant_excluded': 'participant excluded'}
 _TIMES = (('max_cumulative_error_s', 'greatest error [ms]', 1e3, 1),
           ('timeout_ratio', 'timeouts [%]', 100.0, 2),
           ('real_time_ratio_final', 'real-time ratio', 1.0, 4),
@@ -48,7 +50,7 @@ def study_html(data: StudyData) -> str:
         Section('conditions', 'Conditions', condition_section(data)),
         *([Section('planned', 'Planned comparisons', planned_section(data))]
           if study.analysis.comparisons else ()),
-        Section('people', 'Who took part', _people(data)),
+        Section('people', 'Who took part', flow_table(data) + _people(data)),
         Section('troubles', 'Left out, aborted, repeated', _troubles(data)),
         Section('timing', 'Timing of each trial', _timing(data)),
         Section('paper', 'What to report in a paper', paper_section(data))]
@@ -73,9 +75,12 @@ def _facts(data: StudyData) -> list[tuple[str, str]]:
 
 def _people(data: StudyData) -> str:
     fields = [column for column in data.people_table.fields if column.kind != 'string']
-    head = ('', 'order', *(free(column.name) for column in fields), 'begun', 'minutes', 'starts',
-            'trials', 'complete')
+    group = data.people_table.group
+    head = ('', 'order', *(() if group is None else (free(group.name),)),
+            *(free(column.name) for column in fields), 'begun', 'minutes', 'starts', 'trials',
+            'complete')
     rows = [(free(row['participant']), str(row['place']),
+             *(() if group is None else (free(row[group.name] or NOTHING),)),
              *(number(row[column.name], 0 if column.kind == 'integer' else 2)
                for column in fields),
              plain(row['begun'][:16].replace('T', ' ')),

@@ -27,6 +27,7 @@ from crgame_ros.study.data.study_row_table import flag_column, unlike, with_unit
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.quality import PAGE, TIMING
 from crgame_ros.study.trial_plan import PlannedTrial
+from crgame_ros.study.trial_settings import Factor
 
 _SCORED = ('hit_rate', 'response_mean_s', 'response_median_s')
 _ONE = 'there was no detection response task, or several: runs/detection_scores has each'
@@ -65,6 +66,8 @@ WALL = 'wall clock, seconds since 1970-01-01 UTC'
 UNMEASURED = 'the recording could not be measured'
 PARTICIPANT = Column('participant', TEXT, '', 'anonymous id')
 TRIAL = Column('trial', INTEGER, '1', 'number among all of the participant, from 1 on')
+PLACE_IN_GROUP = Column('place_in_group', INTEGER, '1', 'of the participant in the orders of the '
+                        'group, from 1 on')
 _FIRST = (
     PARTICIPANT, TRIAL,
     Column('place', INTEGER, '1', 'of the participant among all, from 1 on: says the order'),
@@ -158,19 +161,26 @@ def declare_trials(study: StudyFile,
     runs = {column.name: column for column in RUNS.columns}
     fixed = [*_DRIVE, *(runs[name] for name in _RUN_COLUMNS), *_TIMING,
              *measure_columns().values(), *TASK_COLUMNS, _ANSWERED]
-    taken = {column.name for column in (*_FIRST, *fixed)}
+    taken = {column.name for column in (*_FIRST, PLACE_IN_GROUP, *fixed)}
     factors: dict[str, Column] = {}
-    for factor in study.factors:
+    for factor in study.all_factors:
         name = unlike(factor.name, taken, '_level')
         taken.add(name)
         factors[factor.name] = Column(
             name, TEXT, '', f'level of the factor {factor.name}', empty='its block does not '
-            'cross it', values=tuple(level.name for level in factor.levels))
+            'cross it', variant=_between(study, factor),
+            values=tuple(level.name for level in factor.levels))
     answers = [column for scale in asked.after_trials.values()
                for column in scale.columns(study.language)]
     return factors, TableDeclaration(
         'trials', 'a trial that counts', ('participant', 'trial'),
-        (*_FIRST, *factors.values(), *fixed, *_apart(answers, taken)))
+        (*_FIRST, *factors.values(), *((PLACE_IN_GROUP,) if study.groups is not None else ()),
+         *fixed, *_apart(answers, taken)))
+
+
+def _between(study: StudyFile, factor: Factor) -> str:
+    return 'between participants' if study.groups is not None \
+        and factor.name == study.groups.name else ''
 
 
 class TrialsTable:
@@ -198,6 +208,7 @@ class TrialsTable:
         trial = attempt.trial
         row = {**_identity(record, trial), **{
             self.factors[name].name: level.name for name, level in trial.condition.levels},
+            **self._grouped(record),
             **self._drive(record, attempt), 'problem': problem or None}
         if run is not None:
             row |= self._measured(attempt, run)
@@ -208,6 +219,13 @@ class TrialsTable:
             faults = self._folder.study.quality.faults(row, checks)
             row |= {f'{kind}_flag': bool(faults), f'{kind}_reason': '; '.join(faults)}
         return row | self._answers(record, trial) | self._made(attempt)
+
+    def _grouped(self, record: ParticipantRecord) -> dict[str, object]:
+        groups, allocation = self._folder.study.groups, record.allocation
+        if groups is None or allocation is None:
+            return {}
+        return {self.factors[groups.name].name: allocation.group,
+                PLACE_IN_GROUP.name: allocation.place + 1}
 
     def _drive(self, record: ParticipantRecord, attempt: TrialAttempt) -> dict[str, object]:
         settings, folder = attempt.trial.condition.settings, attempt.folder

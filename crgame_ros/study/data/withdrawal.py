@@ -29,8 +29,9 @@ from crgame_ros.study.data.study_data_folder import (
 )
 from crgame_ros.study.data.study_report import write_study_report
 from crgame_ros.study.data.study_rerun import RERUN
+from crgame_ros.study.enrolment import read_enrolment
 from crgame_ros.study.folder import MADE, WITHDRAWALS, WITHDRAWING
-from crgame_ros.study.session_journal import JOURNAL, read_journal, SessionEvent
+from crgame_ros.study.session_journal import JOURNAL
 from crgame_ros.whole_file import sync_folder, write_text
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -157,8 +158,12 @@ class Withdrawal:
         lines = log.read_text('utf-8').splitlines() if log.exists() else []
         if not file.exists():
             self._pending.mkdir(parents=True, exist_ok=True)
-            line = json.dumps({'date': today.isoformat(), 'place': _place(self._folder),
-                               'what': _TOLD})
+            enrolment = read_enrolment(self._folder)
+            group = None if enrolment is None or enrolment.allocation is None \
+                else enrolment.allocation.group
+            line = json.dumps({'date': today.isoformat(),
+                               'place': None if enrolment is None else enrolment.place + 1,
+                               **({} if group is None else {'group': group}), 'what': _TOLD})
             written = [name for name in (PACKAGE_FILE, BIDS, REPORT_FILE)
                        if (self.root / DATA / name).exists()]
             write_text(json.dumps(asdict(_State(written, line, len(lines)))) + '\n', file)
@@ -225,12 +230,6 @@ class Withdrawal:
                   '.lock'}
         return [*(path for path in sorted(self.root.iterdir()) if path.name not in known),
                 *(path for path in sorted(data.iterdir()) if path.name not in names)]
-
-
-def _place(folder: Path) -> int | None:
-    """Return a participant's place, from 1 on; None if the session has not begun."""
-    return next((entry['place'] + 1 for entry in read_journal(folder)
-                 if entry['entry'] == SessionEvent.BEGUN), None)
 
 
 def _is_of_others(entry: Path, participant: str) -> bool:

@@ -12,7 +12,7 @@ from crgame_ros.study.drive_state import DrivePhase, DriveState
 from crgame_ros.study.file import Break, Page
 from crgame_ros.study.pages import consent_of
 from crgame_ros.study.participant_session import ParticipantSession
-from crgame_ros.study.session_journal import SessionEvent
+from crgame_ros.study.session_journal import DECLINED, SessionEvent
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 
@@ -44,8 +44,6 @@ class Drives(Protocol):
         """End the present drive; it does not count and is repeated."""
 
 
-# The reason for ending a session without consent.
-DECLINED = 'consent was not given'
 # During these phases of a drive no other item can come first.
 UNDER_WAY = (DrivePhase.COUNTDOWN, DrivePhase.DRIVING, DrivePhase.ENDED)
 

@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from crgame_ros.study.desk.desk import DECLINED, Desk, is_driven, UNDER_WAY
+from crgame_ros.study.answer_condition import AnswerCondition, holds_for
+from crgame_ros.study.desk.desk import Desk, is_driven, UNDER_WAY
 from crgame_ros.study.desk.page_markdown import read_tree
 from crgame_ros.study.drive_state import DrivePhase
 from crgame_ros.study.file import Break, DeviceCheck, Page, Questions
@@ -22,7 +23,7 @@ from crgame_ros.study.question import (
     VasQuestion,
 )
 from crgame_ros.study.questionnaire import load_questionnaire
-from crgame_ros.study.session_journal import SessionEvent
+from crgame_ros.study.session_journal import DECLINED, SessionEvent
 from crgame_ros.study.session_script import Fields, PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 
@@ -49,7 +50,7 @@ def participant_document(desk: Desk) -> dict[str, object]:
         'again': 0 if item is None else _repeats(desk, item),
         'progress': _progress(desk)}
     if item is None or desk.ending:
-        return {**document, 'show': 'over', 'how': how_over(desk)}
+        return {**document, 'show': 'over', 'how': how_over(desk), 'tree': _last_page(desk)}
     if desk.waits:
         return {**document, 'show': 'wait', 'why': 'held'}
     if desk.asks_language:
@@ -58,19 +59,32 @@ def participant_document(desk: Desk) -> dict[str, object]:
 
 
 def how_over(desk: Desk) -> str:
-    """Return how a session ended: done, declined or ended."""
-    ended = next((entry for entry in reversed(desk.session.journal.entries)
-                  if entry['entry'] == SessionEvent.ENDED), None)
-    if ended is None and not desk.ending:
-        return 'done'
-    return 'declined' if ended is not None and ended['reason'] == DECLINED else 'ended'
+    """Return how a session ended: done, declined, excluded or ended."""
+    ended = _end_of(desk)
+    if ended is None:
+        return 'ended' if desk.ending else 'done'
+    if ended['entry'] == SessionEvent.EXCLUDED:
+        return 'excluded'
+    return 'declined' if ended['reason'] == DECLINED else 'ended'
+
+
+def _end_of(desk: Desk) -> Mapping[str, Any] | None:
+    return next((entry for entry in desk.session.journal.entries
+                 if entry['entry'] in (SessionEvent.ENDED, SessionEvent.EXCLUDED)), None)
+
+
+def _last_page(desk: Desk) -> list[object]:
+    """Return the page for a participant who was excluded; empty without one."""
+    file = (_end_of(desk) or {}).get('page')
+    return [] if not file else list(read_tree(desk.session.study, Page(file), desk.language))
 
 
 def _progress(desk: Desk) -> dict[str, int]:
     session = desk.session
     done = session.done
-    trials = [item for item in session.items if isinstance(item.what, PlannedTrial)]
-    return {'done': len(done), 'of': len(session.items),
+    items = session.planned_items
+    trials = [item for item in items if isinstance(item.what, PlannedTrial)]
+    return {'done': len(done), 'of': len(items),
             'drives_done': sum(item.id in done for item in trials), 'drives': len(trials)}
 
 
@@ -93,7 +107,10 @@ def _item(desk: Desk, item: SessionItem) -> dict[str, Any]:
     if isinstance(what, DeviceCheck):
         return {'show': 'device', 'text': what.text.in_language(language)}
     questions = {'show': 'questions', 'title': '', 'text': '', 'matrix': False, 'questions': [
-        _question(question, language) for question in desk.session.questions(item)]}
+        _question(question, language, isinstance(what, Fields))
+        for question in desk.session.questions(item)
+        if isinstance(what, Fields) or question.when is None or question.when.field is None
+        or holds_for(question.when, {}, desk.session.fields)]}
     if isinstance(what, Questions):
         scale = load_questionnaire(questionnaire_name(study, what))
         questions |= {'title': scale.title.in_language(language),
@@ -129,10 +146,21 @@ def practised(desk: Desk, item: SessionItem) -> int:
     return count
 
 
-def _question(question: Question, language: str) -> dict[str, object]:
+def _condition(when: AnswerCondition | None, are_fields: bool) -> dict[str, object] | None:
+    """Return a condition that the page has to test; None without one."""
+    if when is None or when.field is not None and not are_fields:
+        return None
+    return {'question': when.question or when.field, 'at_least': when.at_least,
+            'below': when.below, 'one_of': [
+                value if isinstance(value, int | float) and not isinstance(value, bool)
+                else str(value) for value in when.values]}
+
+
+def _question(question: Question, language: str, are_fields: bool) -> dict[str, object]:
     kind = question.kind
     document: dict[str, object] = {'name': question.name, 'required': question.required,
-                                   'ask': question.ask.in_language(language) or question.name}
+                                   'ask': question.ask.in_language(language) or question.name,
+                                   'when': _condition(question.when, are_fields)}
     if isinstance(kind, LikertQuestion):
         return document | {
             'kind': 'likert', 'points': kind.points, 'left': kind.left.in_language(language),
@@ -169,6 +197,7 @@ def experimenter_document(desk: Desk, page: Mapping[str, object]) -> dict[str, o
     return {
         'study': session.study.title.in_language(session.study.language) or session.study.name,
         'name': session.study.name, 'participant': session.participant, 'place': session.place,
+        'group': None if session.allocation is None else session.allocation.group,
         'language': session.language, 'page': dict(page), 'markers': list(session.study.markers),
         'item': '' if item is None else item.id, 'held': session.held_at is not None,
         'waits': desk.waits, 'ending': desk.ending,
@@ -237,5 +266,6 @@ def _log(desk: Desk) -> list[dict[str, object]]:
     """Return the last entries of the journal, without answers, which only the file holds."""
     return [{name: value[:LONGEST] if isinstance(value, str) else value
              for name, value in entry.items()
-             if name not in ('answers', 'items', 'after_s') and not isinstance(value, dict)}
+             if name not in ('answers', 'items', 'after_s', 'asked')
+             and not isinstance(value, dict)}
             for entry in desk.session.journal.entries[-MOST_ENTRIES:]]

@@ -3,7 +3,16 @@
 /** The messages between the participant's page and the desk's server. */
 
 export type Answer = number | string | string[] | null;
-export interface Asked { name: string; ask: string; required: boolean }
+
+/** A condition on the answer to an earlier question; what is null or empty is not tested. */
+export interface Condition {
+  question: string;
+  one_of: (number | string)[];
+  at_least: number | null;
+  below: number | null;
+}
+
+export interface Asked { name: string; ask: string; required: boolean; when: Condition | null }
 
 export interface LikertQuestion extends Asked {
   kind: 'likert';
@@ -59,7 +68,11 @@ export interface Always {
 
 export interface PlainDocument extends Always { show: 'language' | 'elsewhere' }
 export interface WaitDocument extends Always { show: 'wait'; why: 'held' | 'preparing' | 'failed' }
-export interface OverDocument extends Always { show: 'over'; how: 'done' | 'declined' | 'ended' }
+export interface OverDocument extends Always {
+  show: 'over';
+  how: 'done' | 'declined' | 'excluded' | 'ended';
+  tree: PageNode[]; // the study's own page about it, empty without one
+}
 
 export interface QuestionsDocument extends Always {
   show: 'questions';

@@ -127,7 +127,8 @@ class ExperimenterPage {
     document.title = `${shown.participant}: ${shown.study}`;
     setText(part(document.body, 'study'), shown.study);
     setText(part(document.body, 'who'), `Participant ${shown.participant}, place `
-      + `${shown.place + 1}${shown.language ? `, language ${shown.language}` : ''}`);
+      + `${shown.place + 1}${shown.group ? `, group ${shown.group}` : ''}`
+      + `${shown.language ? `, language ${shown.language}` : ''}`);
     this.#showPage(shown);
     this.#showNow(shown);
     this.#showDrive();
@@ -155,6 +156,7 @@ class ExperimenterPage {
     const row = shown.items.find(({ id }) => id === shown.item);
     setText(part(document.body, 'now-title'), over
       ? { done: 'The session is done', declined: 'Consent was not given: the session is over',
+        excluded: 'The participant is excluded: the session is over',
         ended: 'The session was ended' }[over]
       : `Now: ${row?.kind ?? ''}${row?.condition ? `, ${row.condition}` : ''} (${shown.item})`);
     const lines = [];

@@ -41,6 +41,7 @@ export interface ExperimenterDocument {
   name: string;
   participant: string;
   place: number;
+  group: string | null;
   language: string | null;
   page: ParticipantPage;
   markers: string[];
@@ -48,7 +49,7 @@ export interface ExperimenterDocument {
   held: boolean;
   waits: boolean;
   ending: string;
-  over: '' | 'done' | 'declined' | 'ended';
+  over: '' | 'done' | 'declined' | 'excluded' | 'ended';
   can_abort: boolean;
   drive: DriveNow;
   pause_h: number; // how long nothing happened before the session was opened last [h]

@@ -15,6 +15,7 @@ export function entryWords(entry: LogEntry): string {
     case 'language': return `language: ${rest.language}`;
     case 'held': return rest.held ? 'held before the next item' : 'goes on';
     case 'begun': return 'session begun';
+    case 'allocated': return `group ${rest.group}, place ${Number(rest.place) + 1} in it`;
     case 'ended': return `session ended: ${rest.reason}`;
     case 'started': return `started${of}, attempt ${rest.attempt}${run ? `, ${run}` : ''}`;
     case 'practised': return `practised${of}: ${rest.good ? 'good' : 'not good'}`;

@@ -9,7 +9,7 @@ import { DeviceCheck } from './device_check.js';
 import { Draft, draftName, forgetOtherDrafts } from './draft.js';
 import { DriveFrame } from './drive_frame.js';
 import { PadNavigation } from './pad_navigation.js';
-import { button, pageView } from './page_view.js';
+import { button, pageNodes, pageView } from './page_view.js';
 import { questionForm } from './question_form.js';
 import { Words } from './words.js';
 
@@ -163,7 +163,9 @@ class ParticipantPage {
         this.#check = new DeviceCheck(shown, words, finish);
         return this.#check.node;
       case 'over':
-        return notice(words.of('thanks'), words.of(`over_${shown.how}`));
+        return shown.tree.length > 0
+          ? element('article', { class: 'reading', role: 'status' }, ...pageNodes(shown.tree))
+          : notice(words.of('thanks'), words.of(`over_${shown.how}`));
       case 'wait':
         return notice(words.of('wait'), words.of(`wait_${shown.why}`), true);
       default:

@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Conditions on answers: whether a question is asked, and whether a participant is excluded."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+from crgame_ros.errors import InputError
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import Listed
+from crgame_ros.study.names import ColumnName
+
+_SEE = 'see docs/studies.md for the keys'
+
+
+@dataclass(frozen=True)
+class AnswerCondition:
+    """
+    A condition on an answer; it does not hold without an answer.
+
+    :param question: name of the question.
+    :param questionnaire: name of its questionnaire, for `exclude`; otherwise it is the same one.
+    :param field: name of a field of the participant, instead of a question.
+    :param equals: the answer; of several choices, one that is chosen.
+    :param one_of: answers, of which it is one.
+    :param at_least: least number.
+    :param below: the number is less than this.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    question: ColumnName | None = None
+    questionnaire: ColumnName | None = None
+    field: ColumnName | None = None
+    equals: object = None
+    one_of: Annotated[tuple[object, ...], Listed(noun='answer')] = ()
+    at_least: float | None = None
+    below: float | None = None
+
+    def check(self) -> None:
+        """Refuse a condition on nothing, on two things, or without a test."""
+        if (self.question is None) == (self.field is None):
+            raise InputError('has not one of "question" and "field"', '', 'give exactly one')
+        if self.questionnaire is not None and self.question is None:
+            raise InputError('has "questionnaire" without "question"', '', 'give both')
+        if self.equals is None and not self.one_of and self.at_least is None \
+                and self.below is None:
+            raise InputError('tests nothing', '', 'give equals, one_of, at_least or below')
+        if self.equals is not None and self.one_of:
+            raise InputError('has "equals" and "one_of"', '', 'give one of them')
+
+    @property
+    def values(self) -> tuple[object, ...]:
+        """Return the answers, of which it has to be one; empty if every answer is."""
+        return self.one_of if self.equals is None else (self.equals,)
+
+    def holds(self, answer: Any) -> bool:
+        """Return whether an answer meets all tests that are given."""
+        if answer is None or answer == []:
+            return False
+        if self.at_least is not None or self.below is not None:
+            if not isinstance(answer, int | float):
+                return False
+            if self.at_least is not None and answer < self.at_least \
+                    or self.below is not None and answer >= self.below:
+                return False
+        return not self.values or is_one_of(answer, self.values)
+
+    def text(self) -> str:
+        """Return the condition in words."""
+        what = self.field or (f'{self.questionnaire}.' if self.questionnaire else '') \
+            + str(self.question)
+        tests = [f'is {self.equals}'] if self.equals is not None else []
+        tests += [f'is one of {", ".join(map(str, self.one_of))}'] if self.one_of else []
+        tests += [f'is at least {self.at_least:g}'] if self.at_least is not None else []
+        tests += [f'is below {self.below:g}'] if self.below is not None else []
+        return f'{what} {" and ".join(tests)}'
+
+
+def is_one_of(answer: Any, values: tuple[object, ...]) -> bool:
+    """
+    Return whether an answer, or one of several that are chosen, is one of some values.
+
+    Choices are compared by their names, as YAML may read `yes` as a truth value.
+    """
+    if isinstance(answer, list):
+        return any(is_one_of(each, values) for each in answer)
+    if isinstance(answer, str):
+        return answer in map(str, values)
+    return any(not isinstance(value, bool) and answer == value for value in values)
+
+
+def holds_for(condition: AnswerCondition | None, answers: Mapping[str, Any],
+              fields: Mapping[str, Any]) -> bool:
+    """
+    Return whether a condition holds; None always does.
+
+    :param answers: by question, of the questionnaire.
+    :param fields: of the participant.
+    """
+    if condition is None:
+        return True
+    return condition.holds(fields.get(condition.field) if condition.field is not None
+                           else answers.get(condition.question or ''))
