@@ -15,7 +15,7 @@ from crgame_ros.instruments.extra import require_instruments
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.study.answer_condition import AnswerCondition
-from crgame_ros.study.file import Block, Break, DeviceCheck, Page, Questions, StudyFile
+from crgame_ros.study.file import Break, DeviceCheck, Page, Questions, StudyFile
 from crgame_ros.study.local_text import LocalText
 from crgame_ros.study.pages import page_file, questionnaire_name, steps_of
 from crgame_ros.study.question import ChoiceQuestion, Question
@@ -29,7 +29,13 @@ from crgame_ros.study.session_script import (
 )
 from crgame_ros.study.trial_game import trial_game
 from crgame_ros.study.trial_order import rows_of
-from crgame_ros.study.trial_plan import conditions_of, plan_trials, PlannedTrial
+from crgame_ros.study.trial_plan import (
+    block_rows,
+    blocks_of,
+    conditions_of,
+    plan_trials,
+    PlannedTrial,
+)
 from crgame_ros.study.trial_settings import TrialSettings
 import yaml
 
@@ -236,6 +242,13 @@ def _balance(study: StudyFile) -> Iterator[StudyFinding]:
     if study.participants % len(groups):
         yield StudyFinding('warning', f'groups: {study.participants} participants do not make '
                                       f'{len(groups)} groups of equal size')
+    for group in groups if len(study.blocks) > 1 and (
+            study.block_order != 'given' or study.block_sequences) else ():
+        yield from _unbalanced(_Ordered(
+            f'blocks in {group}' if group else 'blocks', 'block', len(study.blocks), 'block_order',
+            '' if study.block_sequences else study.block_order, block_rows(study)),
+            [[block.name for block in blocks_of(study, place, group)]
+             for place in range(places)])
     for block, group in product(study.blocks, groups):
         try:
             orders = [[trial.condition.name for trial in plan_trials(study, place, group)
@@ -245,22 +258,43 @@ def _balance(study: StudyFile) -> Iterator[StudyFinding]:
             continue
         conditions = len(conditions_of(study, block))
         if conditions > 1:
-            name = f'{block.name} in {group}' if group else block.name
-            yield from _unbalanced(name, block, conditions, orders)
+            yield from _unbalanced(_Ordered(
+                f'{block.name} in {group}' if group else block.name, 'condition', conditions,
+                'order', '' if block.sequences else block.order,
+                block_rows(study) * rows_of(block.order, conditions)), orders)
 
 
-def _unbalanced(name: str, block: Block, conditions: int,
-                orders: list[list[str]]) -> Iterator[StudyFinding]:
+@dataclass(frozen=True)
+class _Ordered:
+    """
+    What is ordered for each participant.
+
+    :param name: for findings.
+    :param noun: of one: condition or block.
+    :param count: number of them.
+    :param key: of the order in the file.
+    :param kind: of the order; empty for sequences of the file.
+    :param rows: multiples of so many participants are balanced.
+    """
+
+    name: str
+    noun: str
+    count: int
+    key: str
+    kind: str
+    rows: int
+
+
+def _unbalanced(what: _Ordered, orders: list[list[str]]) -> Iterator[StudyFinding]:
     first = Counter(order[0] for order in orders)
-    if len(first) < conditions or len(set(first.values())) > 1:
-        rows = rows_of(block.order, conditions)
-        mend = f'take a multiple of {rows} participants' if block.order == 'williams' \
-            and not block.sequences else 'take "order: williams"'
-        yield StudyFinding('warning', f'{name}: with {len(orders)} participants not '
-                                      f'every condition is first equally often; {mend}')
-    follows = Counter(pair for order in orders for pair in _within(order, conditions))
-    if len(follows) < conditions * (conditions - 1) or len(set(follows.values())) > 1:
-        yield StudyFinding('warning', f'{name}: not every condition follows every other '
+    if len(first) < what.count or len(set(first.values())) > 1:
+        mend = f'take a multiple of {what.rows} participants' if what.kind == 'williams' \
+            else f'take "{what.key}: williams"'
+        yield StudyFinding('warning', f'{what.name}: with {len(orders)} participants not '
+                                      f'every {what.noun} is first equally often; {mend}')
+    follows = Counter(pair for order in orders for pair in _within(order, what.count))
+    if len(follows) < what.count * (what.count - 1) or len(set(follows.values())) > 1:
+        yield StudyFinding('warning', f'{what.name}: not every {what.noun} follows every other '
                                       'equally often')
 
 

@@ -188,7 +188,9 @@ class StudyFile:
     :param settings: of all trials.
     :param factors: the factors of the experiment.
     :param before: steps before the first block.
-    :param blocks: in their order.
+    :param blocks: in the order of the file, unless another one is chosen.
+    :param block_order: order of the blocks for each participant.
+    :param block_sequences: lists of all blocks, assigned to participants in turn instead.
     :param after: steps after the last block.
     :param base: directory against which file names are resolved.
     """
@@ -211,6 +213,8 @@ class StudyFile:
     analysis: PlannedAnalysis = PlannedAnalysis()
     settings: TrialSettings = NOTHING
     factors: Annotated[tuple[Factor, ...], Listed(0, 10, 'factor', 'name')] = ()
+    block_order: OrderKind = 'given'
+    block_sequences: Annotated[tuple[tuple[str, ...], ...], Listed(noun='sequence')] = ()
     before: Steps = ()
     after: Steps = ()
     base: Annotated[Path, Folder()] = Path('.')
@@ -224,10 +228,15 @@ class StudyFile:
                     raise InputError(f'names the factor "{name}", which is not there',
                                      f'blocks: {block.name}',
                                      f'name {", ".join(sorted(known)) or "none"}')
+        names = [block.name for block in self.blocks]
+        for number, sequence in enumerate(self.block_sequences):
+            if sorted(sequence) != sorted(names):
+                raise InputError('does not have each block once', f'block_sequences[{number}]',
+                                 f'name {", ".join(names)}')
         check_conditions(self.fields, are_fields=True)
         self._check_groups()
         self._check_exclusions()
-        self.analysis.check_factors(self.all_factors)
+        self.analysis.check_factors(self.all_factors, self.between)
 
     def _check_groups(self) -> None:
         """Refuse groups that fields cannot form, and steps of groups that are not known there."""
@@ -261,6 +270,11 @@ class StudyFile:
     def all_factors(self) -> tuple[Factor, ...]:
         """Return the factors within participants, and the one between them."""
         return (*self.factors, *((self.groups.factor,) if self.groups is not None else ()))
+
+    @property
+    def between(self) -> str | None:
+        """Return the name of the factor between participants; None without one."""
+        return None if self.groups is None else self.groups.name
 
     @property
     def group_names(self) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from crgame_ros.study.given_answers import exclusion_of, field_answers, last_ans
 from crgame_ros.study.groups import allocate, Allocation
 from crgame_ros.study.pages import questionnaire_of, questions_of
 from crgame_ros.study.question import asked_of, check_answers, Question
+from crgame_ros.study.screening import Exclusion
 from crgame_ros.study.session_journal import SessionEvent, SessionJournal
 from crgame_ros.study.session_script import (
     Fields,
@@ -274,6 +275,17 @@ class ParticipantSession:
         self._add(SessionEvent.FINISHED, item=item.id, answers=taken, **told)
         self._settle()
         return item
+
+    def excluded_by(self, item: SessionItem, answers: Mapping[str, object]) -> Exclusion | None:
+        """
+        Return the rule that would exclude the participant after some answers; None without one.
+
+        :raises InputError: if an answer is refused.
+        """
+        taken = check_answers(self.questions(item), answers, item.id,
+                              None if isinstance(item.what, Fields) else self.fields)
+        return exclusion_of(self.study, self.items,
+                            last_answers(self.journal.entries) | {item.id: taken})
 
     def practised(self, good: bool, **told: object) -> bool:
         """

@@ -20,17 +20,19 @@ Alternative = Literal['two-sided', 'less', 'greater']
 @dataclass(frozen=True)
 class Comparison:
     """
-    A planned comparison of a measure between levels of a factor, within participants.
+    A planned comparison of a measure between levels of a factor, or between groups.
 
     :param measure: a column of trials.csv.
-    :param factor: name of the factor.
+    :param factor: name of the factor, within participants, or of the groups, between them.
     :param contrast: two of its levels: the difference is the second less the first; by default
         all pairs of levels.
-    :param effect: expected difference, in standard deviations of the participants' differences,
-        or with `sd` in the measure's unit.
+    :param effect: expected difference, in standard deviations of the participants' differences
+        (between groups: of the participants' means in a group), or with `sd` in the measure's
+        unit.
     :param sd: expected standard deviation, in the measure's unit.
     :param sd_of: whether `sd` is that of the participants' differences between their means of
-        the two levels, or of the trials of a participant in one condition.
+        the two levels, or of the trials of a participant in one condition; between groups it is
+        that of the participants' means in a group.
     :param alternative: hypothesis about the difference.
     """
 
@@ -95,10 +97,11 @@ class PlannedAnalysis:
     family: Literal['analysis', 'comparison'] = 'analysis'
     flagged: Literal['use', 'leave_out'] = 'use'
 
-    def check_factors(self, factors: tuple[Factor, ...]) -> None:
+    def check_factors(self, factors: tuple[Factor, ...], between: str | None) -> None:
         """
         Refuse comparisons of unknown factors or levels.
 
+        :param between: name of the factor between participants; None without one.
         :raises InputError: naming the comparison.
         """
         known = {factor.name: factor for factor in factors}
@@ -108,3 +111,7 @@ class PlannedAnalysis:
                 raise InputError(f'names the factor "{comparison.factor}", which is not there',
                                  where, f'name {", ".join(sorted(known)) or "none"}')
             comparison.check_levels(known[comparison.factor], where)
+            if comparison.factor == between and comparison.sd_of == 'trial':
+                raise InputError('has "sd_of: trial" between groups', where,
+                                 'give the standard deviation of the participants’ means in a '
+                                 'group, without "sd_of"')

@@ -7,7 +7,13 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from crgame_ros.study.file import Block, Break, Practice, Step, StepEntry, StudyFile
-from crgame_ros.study.trial_plan import conditions_of, drive_seed, plan_trials, PlannedTrial
+from crgame_ros.study.trial_plan import (
+    blocks_of,
+    conditions_of,
+    drive_seed,
+    plan_trials,
+    PlannedTrial,
+)
 from crgame_ros.study.trial_settings import drawn, laid, TrialSettings
 
 
@@ -60,7 +66,7 @@ def session_of(study: StudyFile, place: int, group: str = '') -> tuple[SessionIt
     """
     items = list(items_before_groups(study))
     trials = plan_trials(study, place, group)
-    for block in study.blocks:
+    for block in blocks_of(study, place, group):
         items += _block(study, block, place, group,
                         [trial for trial in trials if trial.block == block.name])
     items += _steps('after', study.after, group=group)

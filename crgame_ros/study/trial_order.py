@@ -27,20 +27,22 @@ def williams_rows(count: int) -> list[list[int]]:
     return rows if count % 2 == 0 else rows + [row[::-1] for row in rows]
 
 
-def rows_of(kind: OrderKind, count: int) -> int:
+def rows_of(kind: OrderKind, count: int, sequences: Sequence[Sequence[object]] = ()) -> int:
     """Return the number of participants after which the orders repeat; multiples are balanced."""
+    if sequences:
+        return len(sequences)
     return len(williams_rows(count)) if kind == 'williams' else 1
 
 
-def order_of(kind: OrderKind, count: int, seed: int, place: int, pass_number: int = 0,
+def order_of(kind: OrderKind, count: int, seed: int | str, place: int, pass_number: int = 0,
              sequences: Sequence[Sequence[int]] = (), group: str = '') -> list[int]:
     """
-    Return the order of conditions in one pass through a block.
+    Return the order of conditions in one pass through a block, or of blocks.
 
     :param kind: `williams` assigns each participant the next row of a square whose conditions the
         seed has shuffled; `random` shuffles for each participant and pass; `given` is the file's.
     :param count: of conditions.
-    :param seed: of the study.
+    :param seed: of the study; also with words, so that several orders are not alike.
     :param place: of the participant, from 0 on; of the group, if there are groups.
     :param pass_number: number of the repetition of the block, from 0 on.
     :param sequences: if any, assigned to participants in turn instead of any kind of order.

@@ -8,7 +8,7 @@ from itertools import product
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.file import Block, StudyFile
-from crgame_ros.study.trial_order import order_of
+from crgame_ros.study.trial_order import order_of, rows_of
 from crgame_ros.study.trial_settings import drawn, laid, Level, TrialSettings
 
 
@@ -64,6 +64,29 @@ def conditions_of(study: StudyFile, block: Block, group: str = '') -> tuple[Cond
         for levels in product(*(factor.levels for factor in factors)))
 
 
+def block_rows(study: StudyFile) -> int:
+    """
+    Return the number of successive participants who have the same orders of conditions.
+
+    They go through the orders of the blocks: a place has one of the blocks' orders and one of the
+    conditions', and all combinations come equally often.
+    """
+    return rows_of(study.block_order, len(study.blocks), study.block_sequences)
+
+
+def blocks_of(study: StudyFile, place: int, group: str = '') -> tuple[Block, ...]:
+    """
+    Return the blocks in the order of a participant.
+
+    :param place: of the participant among all, or in the group, from 0 on.
+    :param group: of the participant; empty in a study without groups.
+    """
+    names = [block.name for block in study.blocks]
+    sequences = [[names.index(name) for name in sequence] for sequence in study.block_sequences]
+    return tuple(study.blocks[index] for index in order_of(
+        study.block_order, len(names), f'{study.seed} blocks', place, 0, sequences, group))
+
+
 def plan_trials(study: StudyFile, place: int, group: str = '') -> tuple[PlannedTrial, ...]:
     """
     Plan all trials of a participant.
@@ -73,12 +96,13 @@ def plan_trials(study: StudyFile, place: int, group: str = '') -> tuple[PlannedT
     :raises InputError: if a block's sequence names an unknown condition.
     """
     trials: list[PlannedTrial] = []
-    for block in study.blocks:
+    in_turn = place // block_rows(study)
+    for block in blocks_of(study, place, group):
         conditions = conditions_of(study, block, group)
         sequences = _sequences(block, [condition.name for condition in conditions])
         in_block = 0
         for repetition in range(block.repetitions):
-            for index in order_of(block.order, len(conditions), study.seed, place, repetition,
+            for index in order_of(block.order, len(conditions), study.seed, in_turn, repetition,
                                   sequences, group):
                 in_block += 1
                 number, condition = len(trials) + 1, conditions[index]
@@ -90,16 +114,15 @@ def plan_trials(study: StudyFile, place: int, group: str = '') -> tuple[PlannedT
 
 
 def orders_of(study: StudyFile,
-              places: int) -> Iterator[tuple[str, tuple[PlannedTrial, ...]]]:
+              places: int) -> Iterator[tuple[str, int, tuple[PlannedTrial, ...]]]:
     """
-    Yield names and trials of the first places in the orders, of each group if there are groups.
+    Yield group, place and trials of the first places in the orders, of each group.
 
     :param places: their number, of each group.
     :raises InputError: if the study cannot be planned.
     """
     for group, place in product(study.group_names, range(places)):
-        name = f'{group}, place {place + 1}' if group else f'participant {place + 1}'
-        yield name, plan_trials(study, place, group)
+        yield group, place, plan_trials(study, place, group)
 
 
 def drive_seed(study: StudyFile, place: int, group: str) -> str:

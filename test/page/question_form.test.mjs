@@ -301,11 +301,11 @@ test('successive questions on one scale are rows of a table, and answered as any
   assert.deepEqual(told[0].answers, { a: 3, b: 3, slider: 30, c: 3, d: 3, e: 3 });
 });
 
-const when = (question, test = {}) => ({ question, one_of: [], at_least: null, below: null,
-  ...test });
+const when = (name, tested = {}) => ({ question: name, one_of: [], at_least: null, below: null,
+  ...tested });
 const asks = (name) => !question(name).hidden;
 
-test('a question is asked while its condition holds, and only its answer then is sent', async () => {
+test('a question is asked while its condition holds, and answered only then', async () => {
   ask(CHOICE, { ...NUMBER, when: when('choice', { one_of: ['yes'] }) },
     { ...TEXT, when: when('number', { at_least: 50 }) }, LIKERT);
   const asking = () => ['choice', 'number', 'text', 'likert'].filter(asks);
@@ -350,7 +350,7 @@ test('conditions hold as the server says', () => {
     [{ one_of: [3, 4] }, 4, true], [{ one_of: [3] }, 4, false], [{ one_of: ['3'] }, 3, false],
     [{ one_of: [3] }, '3', true], [{ at_least: 3 }, 3, true], [{ below: 3 }, 3, false],
     [{ at_least: 1, below: 3 }, 2, true], [{ at_least: 1 }, 'yes', false]];
-  for (const [test_, answer, expected] of cases) {
-    assert.equal(holds(when('q', test_), answer), expected, JSON.stringify([test_, answer]));
+  for (const [tested, answer, expected] of cases) {
+    assert.equal(holds(when('q', tested), answer), expected, JSON.stringify([tested, answer]));
   }
 });

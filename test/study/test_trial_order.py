@@ -6,12 +6,14 @@ from collections import Counter
 from itertools import pairwise
 import subprocess
 import sys
+from typing import Any
 
+from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.session_script import PracticeDrives, session_of
 from crgame_ros.study.trial_order import order_of, ORDERS, rows_of, williams_rows
-from crgame_ros.study.trial_plan import plan_trials
+from crgame_ros.study.trial_plan import blocks_of, plan_trials
 import pytest
 
 
@@ -64,6 +66,40 @@ def test_another_process_orders_alike() -> None:
 
 def test_the_square_of_four_is_the_textbooks() -> None:
     assert williams_rows(4) == [[0, 1, 3, 2], [1, 2, 0, 3], [2, 3, 1, 0], [3, 0, 2, 1]]
+
+
+def blocks_in(study: StudyFile, place: int, group: str = '') -> str:
+    """Return the first letters of the blocks, in the order of a participant."""
+    return ''.join(block.name[0] for block in blocks_of(study, place, group))
+
+
+def test_blocks_are_ordered_as_conditions_are() -> None:
+    """Each order of the blocks meets each order of the conditions equally often."""
+    plain: dict[str, Any] = {
+        'name': 'blocks', 'seed': 2, 'factors': [
+            {'name': 'a', 'levels': [{'name': 'x'}, {'name': 'y'}]}],
+        'blocks': [{'name': name, 'repetitions': 2} for name in ('first', 'second')]}
+    given = read(StudyFile, plain, 'study')
+    assert {blocks_in(given, place) for place in range(4)} == {'fs'}
+    study = read(StudyFile, plain | {'block_order': 'williams'}, 'study')
+    met: Counter[tuple[str, str]] = Counter()
+    for place in range(8):
+        trials = plan_trials(study, place)
+        assert [trial.number for trial in trials] == list(range(1, 9))
+        blocks = blocks_in(study, place)
+        assert [trial.block[0] for trial in trials] == [name for name in blocks for _ in range(4)]
+        met[blocks, next(trial.condition.name for trial in trials if trial.block == 'first')] += 1
+        names = [item.id.partition('/')[0] for item in session_of(study, place)]
+        assert names == [trial.block for trial in trials]
+    assert met == dict.fromkeys((('fs', 'x'), ('fs', 'y'), ('sf', 'x'), ('sf', 'y')), 2)
+    turns = read(StudyFile, plain | {'block_sequences': [['second', 'first']] * 2 + [
+        ['first', 'second']]}, 'study')
+    assert [blocks_in(turns, place) for place in range(4)] == ['sf', 'sf', 'fs', 'sf']
+    many = read(StudyFile, plain | {'block_order': 'random', 'blocks': [
+        {'name': name} for name in 'abcdef']}, 'study')
+    assert len({blocks_in(many, place, group) for place in range(4) for group in 'uv'}) == 8
+    with pytest.raises(InputError, match='does not have each block once'):
+        read(StudyFile, plain | {'block_sequences': [['first', 'first']]}, 'study')
 
 
 def test_each_drive_may_have_a_seed_of_its_own() -> None:

@@ -44,19 +44,21 @@ def model_formulas(study: StudyFile) -> list[ModelFormula]:
     """
     Return the model of each planned comparison, each once.
 
-    Its trials are those of the blocks that cross the comparison's factor, its fixed effects are
-    the factors that all these blocks cross.
+    Its trials are those of the blocks that cross the comparison's factor, of groups those of all
+    blocks. Its fixed effects are the factors that all these blocks cross, and the groups.
     """
     return list(dict.fromkeys(_formula(study, comparison)
                               for comparison in study.analysis.comparisons))
 
 
 def _formula(study: StudyFile, comparison: Comparison) -> ModelFormula:
-    blocks = [block for block in study.blocks
-              if comparison.factor in {each.name for each in study.factors_of(block)}]
+    blocks = [block for block in study.blocks if comparison.factor == study.between
+              or comparison.factor in {each.name for each in study.factors_of(block)}]
     factors = tuple(factor for factor in study.factors
                     if all(factor in study.factors_of(block) for block in blocks))
-    return ModelFormula(comparison.measure, factors, tuple(block.name for block in blocks))
+    groups = () if study.groups is None else (study.groups.factor,)
+    return ModelFormula(comparison.measure, (*factors, *groups),
+                        tuple(block.name for block in blocks))
 
 
 @dataclass(frozen=True)

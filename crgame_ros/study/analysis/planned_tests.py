@@ -8,6 +8,7 @@ import math
 from typing import Any
 
 from crgame_ros.study.analysis.paired_test import holm, paired_test, PairedTest
+from crgame_ros.study.analysis.unpaired_test import unpaired_test, UnpairedTest
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.planned_analysis import Comparison
 import numpy as np
@@ -22,13 +23,13 @@ class PlannedTest:
 
     :param comparison: that it belongs to.
     :param pair: the compared levels: the difference is the second less the first.
-    :param test: its result.
+    :param test: its result: within participants, or between groups.
     :param p_holm: the p-value of the t-test, corrected in its family.
     """
 
     comparison: Comparison
     pair: tuple[str, str]
-    test: PairedTest
+    test: PairedTest | UnpairedTest
     p_holm: float
 
 
@@ -62,20 +63,26 @@ def planned_tests(study: StudyFile, rows: Sequence[Mapping[str, Any]],
     """
     Run all planned comparisons.
 
-    A participant's value in a level is the mean over its trials in the level. A participant
-    without a value in one of both levels is not in that test.
+    A participant's value in a level is the mean over its trials in the level. Within
+    participants, one without a value in one of both levels is not in that test.
 
     :param rows: of the table of trials.
     :param columns: of the factors, by their names.
     """
-    factors = {factor.name: factor for factor in study.factors}
+    factors = {factor.name: factor for factor in study.all_factors}
     rows = used_rows(study, rows)
     alpha = study.analysis.alpha
-    found: list[tuple[Comparison, tuple[str, str], PairedTest]] = []
+    found: list[tuple[Comparison, tuple[str, str], PairedTest | UnpairedTest]] = []
     for comparison in study.analysis.comparisons:
         means = level_means(rows, columns[comparison.factor], comparison.measure)
         for pair in comparison.pairs(factors[comparison.factor]):
             first, second = (means.get(level, {}) for level in pair)
+            if comparison.factor == study.between:
+                found.append((comparison, pair, unpaired_test(
+                    np.array([first[person] for person in sorted(first)]),
+                    np.array([second[person] for person in sorted(second)]),
+                    comparison.alternative, alpha)))
+                continue
             people = sorted(first.keys() & second.keys())
             found.append((comparison, pair, paired_test(
                 np.array([first[person] for person in people]),

@@ -7,7 +7,11 @@ from dataclasses import dataclass
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.analysis.planned_tests import planned_tests
-from crgame_ros.study.analysis.simulated_trials import measure_models, SimulatedTrials
+from crgame_ros.study.analysis.simulated_trials import (
+    measure_models,
+    planned_people,
+    SimulatedTrials,
+)
 from crgame_ros.study.file import StudyFile
 import numpy as np
 
@@ -54,17 +58,19 @@ def power_of(study: StudyFile, counts: Sequence[int], runs: int, seed: int,
         raise InputError('states no effect', 'analysis: comparisons',
                          'give "effect" to at least one comparison')
     models = measure_models(study)
-    columns = {factor.name: factor.name for factor in study.factors}
+    columns = {factor.name: factor.name for factor in study.all_factors}
     alpha = study.analysis.alpha
     for place, count in enumerate(counts):
-        trials = SimulatedTrials(study, count, models)
+        trials = SimulatedTrials(study, planned_people(study, count), models)
         rng = np.random.default_rng((seed, count))
         hits: dict[tuple[str, str], int] = {}
         for run in range(runs):
             for each in planned_tests(study, trials.draw(rng), columns):
                 if each.comparison.effect is not None:
                     first, second = each.pair
-                    unit = 'sd of the differences' if each.comparison.sd is None \
+                    unit = 'sd of the participants in a group' \
+                        if each.comparison.factor == study.between else 'sd of the differences'
+                    unit = unit if each.comparison.sd is None \
                         else f"in the measure's unit, sd {each.comparison.sd:g}"
                     key = (f'{each.comparison.measure}, {each.comparison.factor}: '
                            f'{second} - {first}', f'{each.comparison.effect:g} {unit}')

@@ -35,8 +35,32 @@ compare <- function(measure, factor, first, second, alternative) {{
              difference = mean(difference), low = interval[1], high = interval[2],
              t = unname(test$statistic), p = test$p.value, p_wilcoxon = rank$p.value,
              d_z = mean(difference) / sd(difference), d_av = d_av,
-             g_av = d_av * (1 - 3 / (4 * (n - 1) - 1)))
+             g_av = d_av * (1 - 3 / (4 * (n - 1) - 1)){more})
 }}
+"""
+
+
+_BETWEEN = """
+# Test of one measure between groups: each participant's mean over all trials, second less first.
+compare_groups <- function(measure, factor, first, second, alternative) {
+  used <- trials[is.finite(trials[[measure]]) & trials[[factor]] %in% c(first, second), ]
+  if (nrow(used) == 0) return(NULL)
+  means <- aggregate(used[[measure]], list(participant = used$participant,
+                                           group = used[[factor]]), mean)
+  a <- means$x[means$group == first]
+  b <- means$x[means$group == second]
+  n <- length(a) + length(b)
+  if (min(length(a), length(b)) < 2) return(NULL)
+  test <- t.test(b, a, alternative = alternative)
+  interval <- t.test(b, a, conf.level = 1 - alpha)$conf.int
+  rank <- wilcox.test(b, a, alternative = alternative)
+  pooled <- sqrt(((length(a) - 1) * var(a) + (length(b) - 1) * var(b)) / (n - 2))
+  d_s <- (mean(b) - mean(a)) / pooled
+  data.frame(measure = measure, factor = factor, first = first, second = second, n = n,
+             difference = mean(b) - mean(a), low = interval[1], high = interval[2],
+             t = unname(test$statistic), p = test$p.value, p_wilcoxon = rank$p.value,
+             d_z = NA, d_av = NA, g_av = NA, d_s = d_s, g_s = d_s * (1 - 3 / (4 * n - 9)))
+}
 """
 
 
@@ -52,7 +76,10 @@ def r_script(study: StudyFile, columns: Mapping[str, str]) -> str:
     flagged = '' if analysis.flagged == 'use' else (
         '# Trials beyond a bound of quality are left out.\n'
         f'trials <- trials[!({" | ".join(f"trials${flag} %in% TRUE" for flag in FLAGS)}), ]\n')
-    parts = [_HEAD.format(name=study.name, alpha=analysis.alpha, flagged=flagged)]
+    # Both kinds of tests are rows of one table.
+    more = '' if study.groups is None else ', d_s = NA, g_s = NA'
+    parts = [_HEAD.format(name=study.name, alpha=analysis.alpha, flagged=flagged, more=more)]
+    parts += [_BETWEEN] if study.groups is not None else []
     parts += _tests(study, columns)
     parts += ['\nlibrary(lme4)\nlibrary(lmerTest)\n']
     parts += [_model(formula, columns) for formula in model_formulas(study)]
@@ -60,8 +87,8 @@ def r_script(study: StudyFile, columns: Mapping[str, str]) -> str:
 
 
 def _tests(study: StudyFile, columns: Mapping[str, str]) -> Iterator[str]:
-    factors = {factor.name: factor for factor in study.factors}
-    groups = [[_call(comparison, pair, columns)
+    factors = {factor.name: factor for factor in study.all_factors}
+    groups = [[_call(study, comparison, pair, columns)
                for pair in comparison.pairs(factors[comparison.factor])]
               for comparison in study.analysis.comparisons]
     if study.analysis.family == 'analysis':
@@ -73,10 +100,12 @@ def _tests(study: StudyFile, columns: Mapping[str, str]) -> Iterator[str]:
         yield 'print(tests)\n'
 
 
-def _call(comparison: Comparison, pair: tuple[str, str], columns: Mapping[str, str]) -> str:
+def _call(study: StudyFile, comparison: Comparison, pair: tuple[str, str],
+          columns: Mapping[str, str]) -> str:
     alternative = comparison.alternative.replace('-', '.')
     texts = (comparison.measure, columns[comparison.factor], *pair, alternative)
-    return f'compare({", ".join(_text(text) for text in texts)})'
+    function = 'compare_groups' if comparison.factor == study.between else 'compare'
+    return f'{function}({", ".join(_text(text) for text in texts)})'
 
 
 def _model(formula: ModelFormula, columns: Mapping[str, str]) -> str:

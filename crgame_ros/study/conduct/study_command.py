@@ -109,8 +109,8 @@ def check_command(values: argparse.Namespace) -> int:
         return 1
     if study.groups is not None:
         print(f'groups by {study.groups.name}: {study.groups.told}')
-    for name, trials in orders_of(study, values.participants):
-        print(f'{name}:')
+    for group, place, trials in orders_of(study, values.participants):
+        print(f'{group}, place {place + 1}:' if group else f'participant {place + 1}:')
         for trial in trials:
             print(f'  {trial.number:3}  {trial.block}  {trial.condition.name}')
     length = length_of(study)

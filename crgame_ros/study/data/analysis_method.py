@@ -37,6 +37,10 @@ def method_of(study: StudyFile) -> str:
         else 'the tests of each comparison'
     flagged = 'Trials beyond a bound of quality are used.' if analysis.flagged == 'use' \
         else 'Trials beyond a bound of quality (timing_flag, page_flag) are left out.'
+    between = '' if all(each.factor != study.between for each in analysis.comparisons) else (
+        'Between groups, a participant’s value is the mean over all its trials; test and interval '
+        'are those of Welch, with Satterthwaite’s degrees of freedom, beside the test of Mann and '
+        'Whitney. ')
     return (
         'A participant’s value in a level is the mean over its trials in the level, in all blocks '
         'that cross the factor. A participant without a value in one of both levels is not in '
@@ -44,4 +48,4 @@ def method_of(study: StudyFile) -> str:
         f'its two-sided {100.0 * (1.0 - analysis.alpha):g} % interval by Student’s t. p is that '
         'of the paired t-test, p (Holm) is corrected by Holm (1979) over '
         f'{family}, with α = {analysis.alpha:g}. Beside it stands the p-value of Wilcoxon’s '
-        f'signed-rank test, uncorrected. {flagged}')
+        f'signed-rank test, uncorrected. {between}{flagged}')

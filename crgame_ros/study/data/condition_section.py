@@ -5,6 +5,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import math
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 from crgame_ros.analysis.report.svg_axis import axis_ticks, tick_text
@@ -114,18 +115,20 @@ def within_halves(table: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(_t(people - 1) * np.sqrt(variances / people))
 
 
-def participant_means(rows: Iterable[Mapping[str, Any]],
-                      column: str) -> dict[tuple[str, str], float]:
+def participant_means(rows: Iterable[Mapping[str, Any]], column: str,
+                      name_of: Callable[[Mapping[str, Any]], str] = itemgetter('condition')
+                      ) -> dict[tuple[str, str], float]:
     """
     Compute the mean of a column for each participant in each condition, over repetitions.
 
     :param rows: of the table of trials; missing and infinite values are left out.
+    :param name_of: returns what a trial is counted to, by default its condition.
     """
     found: dict[tuple[str, str], list[float]] = {}
     for row in rows:
         value = row.get(column)
         if value is not None and math.isfinite(value):
-            found.setdefault((row['participant'], row['condition']), []).append(float(value))
+            found.setdefault((row['participant'], name_of(row)), []).append(float(value))
     return {key: sum(values) / len(values) for key, values in found.items()}
 
 
@@ -246,9 +249,15 @@ class ShownMeasure(NamedTuple):
                    for each in self.means.conditions)
 
 
-def shown_measures(data: StudyData, conditions: Sequence[str],
-                   blocks: Sequence[str]) -> list[ShownMeasure]:
-    """Return the scores and measures with values in these blocks, with their means."""
+def shown_measures(data: StudyData, conditions: Sequence[str], blocks: Sequence[str],
+                   name_of: Callable[[Mapping[str, Any]], str] = itemgetter('condition')
+                   ) -> list[ShownMeasure]:
+    """
+    Return the scores and measures with values in these blocks, with their means.
+
+    :param conditions: names, in the order of the table.
+    :param name_of: returns the one of these names that a trial is counted to.
+    """
     measures = measure_columns()
     scored = list(_scored(data))
     bounds = {column.name: ends for column, ends in scored}
@@ -258,7 +267,7 @@ def shown_measures(data: StudyData, conditions: Sequence[str],
     found = []
     rows = [trial.row for trial in data.trials if trial.row['block'] in blocks]
     for group, column in columns:
-        values = participant_means(rows, column.name)
+        values = participant_means(rows, column.name, name_of)
         if values:
             found.append(ShownMeasure(group, column, condition_means(values, conditions),
                                       bounds.get(column.name, _UNBOUND)))
@@ -306,6 +315,29 @@ def _block(data: StudyData, conditions: tuple[str, ...], blocks: Sequence[str],
     if not shown:
         return html + note('There are no values yet.')
     html += interval_note([each.means for each in shown])
+    html += _tables(shown, conditions)
+    return html + _groups(data, conditions, blocks)
+
+
+def _groups(data: StudyData, conditions: tuple[str, ...], blocks: Sequence[str]) -> str:
+    """Return the tables by group: over all conditions, and of each condition in each group."""
+    groups = data.folder.study.groups
+    if groups is None:
+        return ''
+    column = data.factor_columns[groups.name]
+    html = f'<h3>By {free(groups.name)}</h3>' + note(
+        'Means over the participants of each group. The intervals are Student’s, of each group '
+        'alone: they are between participants, and also hold the spread of people.')
+    html += _tables(shown_measures(data, groups.names, blocks, itemgetter(column)), groups.names)
+    if len(conditions) < 2:
+        return html
+    cells = tuple(f'{group}/{condition}' for group in groups.names for condition in conditions)
+    return html + _tables(shown_measures(
+        data, cells, blocks, lambda row: f'{row[column]}/{row["condition"]}'), cells)
+
+
+def _tables(shown: Sequence[ShownMeasure], conditions: Sequence[str]) -> str:
+    html = ''
     if any(each.is_cut for each in shown):
         html += note('An interval that goes beyond the ends of its scale is drawn up to them.')
     for group in dict.fromkeys(each.group for each in shown):

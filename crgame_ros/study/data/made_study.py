@@ -2,14 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Makes the data of a study without people, to try its whole analysis before the first session."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import count
 import json
 from pathlib import Path
+from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.software import software_with_commit
-from crgame_ros.study.analysis.simulated_trials import measure_models, SimulatedTrials
+from crgame_ros.study.analysis.simulated_trials import (
+    measure_models,
+    planned_people,
+    SimulatedPerson,
+    SimulatedTrials,
+)
 from crgame_ros.study.file import Page, StudyFile
 from crgame_ros.study.folder import MADE, StudyFolder
 from crgame_ros.study.participant_session import ParticipantSession
@@ -21,7 +27,7 @@ from crgame_ros.study.question import (
     SliderQuestion,
     VasQuestion,
 )
-from crgame_ros.study.session_script import PracticeDrives
+from crgame_ros.study.session_script import PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 from crgame_ros.whole_file import write_text
 import numpy as np
@@ -30,6 +36,8 @@ import numpy as np
 _BEGIN_S, _STEP_S = 946_684_800.0, 30.0
 # Answers to numbers without bounds.
 _LOW, _HIGH = 0.0, 100.0
+# Random answers to an item, of which one has to keep the participant in the study.
+_TRIES = 1000
 
 
 def make_study(study: StudyFile, file: Path, pictures: Sequence[str], out: Path,
@@ -49,45 +57,72 @@ def make_study(study: StudyFile, file: Path, pictures: Sequence[str], out: Path,
     """
     if out.exists():
         raise InputError('is there already', str(out), 'name another folder with --out')
-    trials = SimulatedTrials(study, participants, measure_models(study, effects))
+    models = measure_models(study, effects)
     folder = StudyFolder(out)
     folder.keep_study(study, file, pictures)
     write_text(json.dumps({
         'made_by': 'crgame study make-data', 'participants': participants, 'seed': seed,
         'effects': effects, 'software': software_with_commit()}, indent=1) + '\n', out / MADE)
-    rng = np.random.default_rng(seed)
-    values = {(row['participant'], row['trial']): {
-        measure: row[measure] for measure in trials.measures} for row in trials.draw(rng)}
+    rng, answers_rng = np.random.default_rng(seed), np.random.default_rng((seed, 1))
     times = (_BEGIN_S + _STEP_S * number for number in count())
-    for place, name in enumerate(trials.participants):
-        with ParticipantSession(study, folder.participant(name), name, place,
-                                lambda: next(times)) as session:
-            for _ in _finish_all(session, rng, values):
-                pass
-        progress((place + 1) / participants)
+    is_given = study.groups is not None and study.groups.allocation == 'given'
+    people = planned_people(study, participants)
+    for number, planned in enumerate(people):
+        with ParticipantSession(study, folder.participant(planned.id), planned.id,
+                                clock_s=lambda: next(times),
+                                group=planned.group if is_given else None) as session:
+            _finish_all(session, answers_rng, lambda person: SimulatedTrials(
+                study, [person], models).draw(rng))
+        progress((number + 1) / participants)
 
 
 def _finish_all(session: ParticipantSession, rng: np.random.Generator,
-                values: Mapping[tuple[str, int], Mapping[str, float]]) -> Iterator[None]:
+                draw: Callable[[SimulatedPerson], Sequence[Mapping[str, Any]]]) -> None:
+    """
+    Go through a session.
+
+    :param draw: returns the trials of a person, whose group is known then.
+    """
+    measures = dict.fromkeys(each.measure for each in session.study.analysis.comparisons)
+    values: dict[int, dict[str, float]] = {}
     while (item := session.next_item) is not None:
         what = item.what
         if isinstance(what, PracticeDrives):
             session.practised(good=True)
         elif isinstance(what, PlannedTrial):
+            if not values:
+                place, group = (session.place, '') if session.allocation is None else (
+                    session.allocation.place, session.allocation.group)
+                values = {row['trial']: {measure: row[measure] for measure in measures}
+                          for row in draw(SimulatedPerson(session.participant, place, group))}
             attempt = session.start()
-            session.finish(run='', attempt=attempt, outcome='time',
-                           made=values[session.participant, what.number])
+            session.finish(run='', attempt=attempt, outcome='time', made=values[what.number])
         elif isinstance(what, Page):
             session.finish(agreed=True)
         else:
-            session.finish({question.name: _answer(question, rng)
-                            for question in session.questions(item)})
-        yield
+            session.finish(_answers(session, item, rng))
+
+
+def _answers(session: ParticipantSession, item: SessionItem,
+             rng: np.random.Generator) -> dict[str, object]:
+    """
+    Return random answers with which the participant stays in the study.
+
+    :raises InputError: if its rules exclude nearly everybody.
+    """
+    for _ in range(_TRIES):
+        given = {question.name: _answer(question, rng) for question in session.questions(item)}
+        if session.excluded_by(item, given) is None:
+            return given
+    raise InputError('excludes nearly everybody whose answers are random', item.id,
+                     'look at the rules under exclude')
 
 
 def _answer(question: Question, rng: np.random.Generator) -> object:
-    """Return a random answer that the question takes."""
+    """Return a random answer that the question takes; of an attention check the expected one."""
     kind = question.kind
+    if question.expect is not None:
+        return str(question.expect) if isinstance(kind, ChoiceQuestion) else question.expect
     if isinstance(kind, LikertQuestion):
         return int(rng.integers(1, kind.points + 1))
     if isinstance(kind, VasQuestion):

@@ -138,6 +138,9 @@ def _study(data: StudyData, told: Mapping[str, Any]) -> Iterator[Sequence[str]]:
                               f'{study.groups.told}')
     yield 'Seed of the orders', plain(study.seed)
     yield 'Seeds of the drives', plain(', '.join(map(str, told['random_seeds'])) or 'none yet')
+    if len(study.blocks) > 1:
+        yield 'Order of the blocks', 'given sequences' if study.block_sequences \
+            else 'as in the file' if study.block_order == 'given' else study.block_order
     for block in study.blocks:
         order = 'given sequences' if block.sequences else block.order
         factors = ' × '.join(f'{factor.name} ({len(factor.levels)})'

@@ -7,7 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
 from crgame_ros.errors import InputError
 from crgame_ros.study.analysis.mixed_model import fit_models, missing_extra, MixedModel
+from crgame_ros.study.analysis.paired_test import PairedTest
 from crgame_ros.study.analysis.planned_tests import planned_tests, PlannedTest, used_rows
+from crgame_ros.study.analysis.unpaired_test import UnpairedTest
 from crgame_ros.study.data.analysis_method import check_measures, method_of
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.file import StudyFile
@@ -38,30 +40,46 @@ def _method(study: StudyFile, trials: int, used: int) -> str:
 def _tests(data: StudyData, tests: Sequence[PlannedTest]) -> str:
     units = {column.name: column.unit for column in data.trials_table.declaration.columns}
     alpha = data.folder.study.analysis.alpha
-    rows = []
+    within: list[Sequence[str]] = []
+    between: list[Sequence[str]] = []
     for each in tests:
         test, unit = each.test, units[each.comparison.measure]
         digits = _digits(test.difference)
+        if isinstance(test, PairedTest):
+            rows, n, freedom = within, str(test.participants), max(0, test.participants - 1)
+            df, p_rank = str(freedom), test.p_signed_rank
+        else:
+            rows, n = between, ' / '.join(map(str, test.counts))
+            df, p_rank = number(test.freedom, 1), test.p_rank_sum
         rows.append((
-            _name(each), plain('' if unit == '1' else unit), str(test.participants),
+            _name(each), plain('' if unit == '1' else unit), n,
             number(test.first, digits), number(test.second, digits),
             f'{number(test.difference, digits)} <small>[{number(test.low, digits)}; '
             f'{number(test.high, digits)}]</small>',
-            f'{number(test.t, 2)} <small>({max(0, test.participants - 1)})</small>',
-            _WORDS[each.comparison.alternative], _p(test.p), _p(each.p_holm),
-            _p(test.p_signed_rank)))
-    return table(f'Differences within participants, with {100.0 * (1.0 - alpha):g} % intervals', (
+            f'{number(test.t, 2)} <small>({df})</small>',
+            _WORDS[each.comparison.alternative], _p(test.p), _p(each.p_holm), _p(p_rank)))
+    ends = f'with {100.0 * (1.0 - alpha):g} % intervals'
+    return ''.join(table(f'{words}, {ends}', (
         '', 'unit', 'n', 'first', 'second', 'difference', 't <small>(df)</small>', 'tested', 'p',
-        'p (Holm)', 'p (Wilcoxon)'), rows, 'numbers')
+        'p (Holm)', f'p ({rank})'), rows, 'numbers') for words, rank, rows in (
+            ('Differences within participants', 'Wilcoxon', within),
+            ('Differences between groups', 'Mann-Whitney', between)) if rows)
 
 
 def _effects(tests: Sequence[PlannedTest]) -> str:
-    return table('Effect sizes', ('', 'd<sub>z</sub>', 'd<sub>av</sub>', 'g<sub>av</sub>'), [
-        (_name(each), number(each.test.d_z, 2), number(each.test.d_av, 2),
-         number(each.test.g_av, 2)) for each in tests], 'numbers') + note(
+    within = [(_name(each), number(each.test.d_z, 2), number(each.test.d_av, 2),
+               number(each.test.g_av, 2)) for each in tests if isinstance(each.test, PairedTest)]
+    between = [(_name(each), number(each.test.d_s, 2), number(each.test.g_s, 2))
+               for each in tests if isinstance(each.test, UnpairedTest)]
+    html = '' if not within else table('Effect sizes', (
+        '', 'd<sub>z</sub>', 'd<sub>av</sub>', 'g<sub>av</sub>'), within, 'numbers') + note(
         'By Lakens (2013): d<sub>z</sub> is the mean difference over the standard deviation of '
         'the differences, d<sub>av</sub> over the mean of both levels’ standard deviations; '
         'g<sub>av</sub> is d<sub>av</sub> with Hedges’ correction.')
+    return html + ('' if not between else table('Effect sizes between groups', (
+        '', 'd<sub>s</sub>', 'g<sub>s</sub>'), between, 'numbers') + note(
+        'By Lakens (2013): d<sub>s</sub> is the difference of the means over the pooled standard '
+        'deviation of the groups; g<sub>s</sub> is d<sub>s</sub> with Hedges’ correction.'))
 
 
 def _name(each: PlannedTest) -> str:

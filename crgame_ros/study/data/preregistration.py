@@ -18,9 +18,10 @@ from crgame_ros.study.analysis.power import Power, power_lines
 from crgame_ros.study.data.analysis_method import check_measures, method_of
 from crgame_ros.study.data.asked_questions import AskedQuestions
 from crgame_ros.study.data.trials_table import declare_trials
-from crgame_ros.study.file import Block, StudyFile
+from crgame_ros.study.file import StudyFile
 from crgame_ros.study.folder import StudyFolder
-from crgame_ros.study.trial_plan import plan_trials
+from crgame_ros.study.trial_order import OrderKind
+from crgame_ros.study.trial_plan import orders_of
 from crgame_ros.yaml_text import read_text
 
 PREREGISTRATION = 'preregistration.md'
@@ -125,6 +126,10 @@ def preregistration_of(study: StudyFile, files: Mapping[str, str],
 def _design(study: StudyFile) -> Iterator[str]:
     yield from ('## Design', '', f'{study.participants} participants are planned. All factors of '
                 'a block are crossed, and varied within participants.', '')
+    if study.groups is not None:
+        yield from (f'The factor {study.groups.name} is varied between participants: '
+                    f'{", ".join(study.groups.names)}. Groups by {study.groups.told}, with the '
+                    f'seed {study.seed}.', '')
     if study.factors:
         yield from ('| factor | levels |', '|---|---|')
         yield from (f'| {factor.name} | {", ".join(level.name for level in factor.levels)} |'
@@ -133,24 +138,32 @@ def _design(study: StudyFile) -> Iterator[str]:
     yield from ('| block | factors | repetitions | order |', '|---|---|---|---|')
     for block in study.blocks:
         names = ' × '.join(factor.name for factor in study.factors_of(block)) or 'one condition'
-        yield f'| {block.name} | {names} | {block.repetitions} | {_order(block)} |'
+        yield f'| {block.name} | {names} | {block.repetitions} ' \
+            f'| {_order(block.order, block.sequences)} |'
     yield ''
+    if len(study.blocks) > 1:
+        yield from (f'Order of the blocks: {_order(study.block_order, study.block_sequences)}.',
+                    '')
 
 
-def _order(block: Block) -> str:
-    if block.sequences:
+def _order(kind: OrderKind, sequences: Sequence[object]) -> str:
+    if sequences:
         return 'sequences of the file, in turn'
     return {'williams': 'Latin square balanced for carry-over (Williams 1949)',
             'random': 'random for each participant and repetition', 'given': 'as in the file'}[
-                block.order]
+                kind]
 
 
 def _orders(study: StudyFile) -> Iterator[str]:
+    groups = study.group_names
     yield from ('## Orders', '', f'By the seed {study.seed}. Participants take the next free '
-                'place.', '', '| place | trials, in this order |', '|---|---|')
-    for place in range(study.participants):
-        trials = ', '.join(trial.condition.name for trial in plan_trials(study, place))
-        yield f'| {place + 1} | {trials} |'
+                f'place{" of their group" if study.groups is not None else ""}. The place of '
+                'a participant who drops out is free again.', '',
+                '| place | trials, in this order |', '|---|---|')
+    for group, place, trials in orders_of(study, -(-study.participants // len(groups))):
+        told = ', '.join(trial.condition.name if len(study.blocks) == 1 else
+                         f'{trial.block}: {trial.condition.name}' for trial in trials)
+        yield f'| {group} {place + 1} | {told} |'.replace('|  ', '| ')
     yield ''
 
 
@@ -178,6 +191,10 @@ def _exclusion(study: StudyFile) -> Iterator[str]:
     yield from ('## Exclusion and missing data', '', 'A trial beyond one of these bounds '
                 f'{beyond}. Trials that are marked {used}.', '', '| value | bound |', '|---|---|')
     yield from (f'| {words} | {bound} |' for words, bound in quality.told())
+    if study.exclude:
+        yield from ('', 'A participant is excluded, and replaced, by one of these rules. Trials '
+                    'of participants who were excluded are not used.', '',
+                    *(f'- {rule.told}' for rule in study.exclude))
     yield from ('', 'Of each trial the last attempt that finished counts; one that was aborted '
                 'comes again. A trial that was left out, or whose measure has no value, is '
                 'missing.', '')
@@ -188,20 +205,25 @@ def _analysis(study: StudyFile, columns: Mapping[str, str]) -> Iterator[str]:
     if not study.analysis.comparisons:
         yield from ('No comparison is planned.', '')
         return
-    factors = {factor.name: factor for factor in study.factors}
+    factors = {factor.name: factor for factor in study.all_factors}
     yield from ('| measure | factor | difference | hypothesis | expected |',
                 '|---|---|---|---|---|')
     for each in study.analysis.comparisons:
         for first, second in each.pairs(factors[each.factor]):
             hypothesis = {'two-sided': '≠ 0', 'greater': '> 0', 'less': '< 0'}[each.alternative]
             expected = 'not stated' if each.effect is None else \
-                f'd_z = {each.effect:g}' if each.sd is None else \
-                f'{each.effect:g}, standard deviation {each.sd:g} (of a {each.sd_of})'
+                f'{each.effect:g}, standard deviation {each.sd:g} (in a group)' \
+                if each.sd is not None and each.factor == study.between else \
+                f'{each.effect:g}, standard deviation {each.sd:g} (of a {each.sd_of})' \
+                if each.sd is not None else \
+                f'{"d_s" if each.factor == study.between else "d_z"} = {each.effect:g}'
             yield f'| {each.measure} | {each.factor} | {second} − {first} | {hypothesis} ' \
                 f'| {expected} |'
+    between = '' if study.groups is None else '; between groups d_s and g_s'
     yield from ('', method_of(study), '', 'Effect sizes: d_z, d_av, and g_av with Hedges’ '
-                'correction (Lakens 2013).', '', 'Mixed models of the trials, by restricted '
-                'maximum likelihood, with the first level of each factor as its reference:', '')
+                f'correction (Lakens 2013){between}.', '', 'Mixed models of the trials, by '
+                'restricted maximum likelihood, with the first level of each factor as its '
+                'reference:', '')
     for formula in model_formulas(study):
         yield f'- `{formula.text(columns)}`, trials of {", ".join(formula.blocks)}'
     yield ''
