@@ -200,9 +200,9 @@ def _conditions_on_answers(study: StudyFile) -> Iterator[StudyFinding]:
                 scales[scale.name] = {question.name: question for question in scale.questions}
     for scale_name, questions in scales.items():
         for question in questions.values():
-            if question.when is not None and question.when.field is not None:
+            if question.when is not None:
                 yield from _untestable(f'{scale_name}: {question.name}: when', question.when,
-                                       fields)
+                                       questions if question.when.field is None else fields)
     for field in study.fields:
         if field.when is not None:
             yield from _untestable(f'fields: {field.name}: when', field.when, fields)

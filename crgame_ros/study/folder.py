@@ -14,7 +14,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell_scene import values_of_game
 from crgame_ros.evaluation.content import ContentStore, digests_in
 from crgame_ros.recording.run_folder import PARTICIPANTS, STUDY_FILE
-from crgame_ros.study.enrolment import enrolled, free_place, read_enrolment
+from crgame_ros.study.enrolment import enrolled, read_enrolment
 from crgame_ros.study.file import Page, Questions, StudyFile
 from crgame_ros.study.pages import steps_of
 from crgame_ros.study.session_journal import read_journal
@@ -138,11 +138,6 @@ class StudyFolder:
     def participant(self, name: str) -> Path:
         """Return the folder of a participant, which may not exist yet."""
         return self.root / PARTICIPANTS / name
-
-    def place_of(self, name: str) -> int:
-        """Return a participant's place among all: the stored one, or the next free one."""
-        own = read_enrolment(self.participant(name))
-        return free_place(self.root / PARTICIPANTS) if own is None else own.place
 
     def begin(self, name: str) -> None:
         """

@@ -76,13 +76,19 @@ class ParticipantSession:
             if begun is None:
                 self._add(SessionEvent.BEGUN, **mine, **({} if group is None else {
                     'group': group}))
+        if begun is not None and {name: begun[name] for name in mine} != mine:
+            raise self._other_plan()
         if allocated is not None:
-            self._take(allocation_of(allocated))
-        if begun is not None and {name: begun[name] for name in mine} != mine \
-                or allocated is not None and allocated['items'] != [
-                    item.id for item in self.items]:
-            raise InputError('began with another plan', str(self._folder),
-                             'put the study file back, or name another participant')
+            allocation = self.allocation = allocation_of(allocated)
+            if allocation.group not in self.study.group_names:
+                raise self._other_plan()
+            self.items = session_of(self.study, allocation.place, allocation.group)
+            if allocated['items'] != [item.id for item in self.items]:
+                raise self._other_plan()
+
+    def _other_plan(self) -> InputError:
+        return InputError('began with another plan', str(self._folder),
+                          'put the study file back, or name another participant')
 
     def _check_given(self, group: str | None, begun: Mapping[str, Any] | None) -> None:
         """Refuse a group where none is given, none where one is, and another than before."""
@@ -101,10 +107,6 @@ class ParticipantSession:
         if begun is not None and group is not None and begun.get('group') != group:
             raise InputError(f'is in the group {begun.get("group")} already', self.participant,
                              'leave out --group: a group is given once')
-
-    def _take(self, allocation: Allocation) -> None:
-        self.allocation = allocation
-        self.items = session_of(self.study, allocation.place, allocation.group)
 
     def _settle(self) -> None:
         """
@@ -130,19 +132,28 @@ class ParticipantSession:
     def _allocate(self, fields: Mapping[str, Any]) -> None:
         groups = self.study.groups
         assert groups is not None
+        given = next(entry.get('group') for entry in self.journal.entries
+                     if entry['entry'] == SessionEvent.BEGUN)
+        if groups.allocation == 'given' and given not in groups.names:
+            raise self._other_plan()
+        for field in self.study.fields:
+            if field.name in groups.deciding_fields and field.refusal(fields.get(field.name)):
+                raise InputError(f'has no answer to "{field.name}", which decides on the group',
+                                 str(self.journal.path), 'put back the journal, or name another '
+                                 'participant')
         with enrolling(self._folder.parent):
             others = [(each.dropped_out, each.allocation)
                       for each in enrolled(self._folder.parent)
                       if each.participant != self._folder.name]
             before = [(dropped_out, each) for dropped_out, each in others if each is not None]
-            self._take(allocate(
+            allocation = allocate(
                 groups, self.study.seed, fields,
-                [each for dropped_out, each in before if not dropped_out], len(before),
-                next(entry.get('group') for entry in self.journal.entries
-                     if entry['entry'] == SessionEvent.BEGUN)))
-            assert self.allocation is not None
-            self._add(SessionEvent.ALLOCATED, **asdict(self.allocation),
-                      items=[item.id for item in self.items])
+                [each for dropped_out, each in before if not dropped_out], len(before), given)
+            items = session_of(self.study, allocation.place, allocation.group)
+            self._add(SessionEvent.ALLOCATED, **asdict(allocation),
+                      items=[item.id for item in items])
+        # Only what is on the disk counts.
+        self.allocation, self.items = allocation, items
 
     def __enter__(self) -> Self:
         return self

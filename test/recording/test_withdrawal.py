@@ -9,7 +9,8 @@ import subprocess
 import sys
 
 from crgame_ros.cli import main
-from crgame_ros.study.folder import StudyFolder, WITHDRAWALS
+from crgame_ros.study.enrolment import free_place
+from crgame_ros.study.folder import WITHDRAWALS
 from crgame_ros.study.session_journal import SessionJournal
 from personal_files import unlisted_files
 import polars
@@ -74,7 +75,7 @@ def test_nothing_of_the_participant_is_left(copied: Path,
     assert json.loads(line).keys() == {'date', 'place', 'what'}
     assert json.loads(line)['place'] == 2
     # The next participant gets the place, so that the orders are balanced as planned.
-    assert StudyFolder(copied).place_of('P05') == 1
+    assert free_place(copied / 'participants') == 1
     assert main(['validate', str(copied)]) == 0
 
 

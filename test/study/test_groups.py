@@ -19,7 +19,7 @@ from crgame_ros.study.enrolment import enrolled
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.groups import allocate, Allocation, Groups
 from crgame_ros.study.participant_session import ParticipantSession
-from crgame_ros.study.session_journal import JOURNAL, read_journal
+from crgame_ros.study.session_journal import JOURNAL, read_journal, SessionJournal
 from crgame_ros.study.session_script import drives_of, session_of
 from crgame_ros.study.trial_plan import plan_trials
 import pytest
@@ -297,6 +297,47 @@ def test_steps_of_groups_that_are_not_known_are_refused() -> None:
             ({'after': [{'break': {}, 'groups': ['bats']}]}, 'names the group "bats"')):
         with pytest.raises(InputError, match=told):
             read(StudyFile, STUDY | more, 'study')
+
+
+def test_a_journal_of_other_groups_or_answers_is_refused(tmp_path: Path) -> None:
+    """Journals and study files may be edited; nobody is then in a wrong group."""
+    group = arrive(tmp_path, 'P1').group
+    renamed = [level | {'name': f'{level["name"]}-2'} for level in LEVELS]
+    other = read(StudyFile, STUDY | {'blocks': [{'name': 'main'}], 'groups': STUDY['groups'] | {
+        'levels': renamed}}, 'study')
+    with pytest.raises(InputError, match='began with another plan'), \
+            opened(tmp_path, 'P1', other):
+        pass
+    journal = tmp_path / 'P1' / JOURNAL
+    lines = journal.read_text().splitlines(keepends=True)
+    journal.write_text(''.join(lines[:-1]).replace('"age": 40', '"age": "old"'))
+    with pytest.raises(InputError, match='has no answer to "age", which decides'), \
+            opened(tmp_path, 'P1'):
+        pass
+    journal.write_text(''.join(lines[:-1]))
+    with opened(tmp_path, 'P1') as session:
+        assert session.allocation is not None and session.allocation.group == group
+
+
+def test_an_allocation_that_cannot_be_noted_does_not_count(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The disk is full for a moment: the last item comes again, and is then followed by drives."""
+    with opened(tmp_path, 'P1') as session:
+        add = SessionJournal.add
+
+        def full(journal: SessionJournal, entry: dict[str, Any]) -> None:
+            if entry['entry'] == 'allocated':
+                raise InputError('cannot be written (No space left)', str(journal.path))
+            add(journal, entry)
+
+        with monkeypatch.context() as patched, pytest.raises(InputError, match='No space left'):
+            patched.setattr(SessionJournal, 'add', full)
+            session.finish(PERSON)
+        assert session.allocation is None
+        assert session.next_item is not None and session.next_item.id == 'fields'
+        session.finish(PERSON)
+        assert session.allocation is not None
+        assert session.next_item is not None and session.next_item.id.startswith('main')
 
 
 def test_an_entry_that_is_damaged_is_left_out(tmp_path: Path) -> None:

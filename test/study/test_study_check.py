@@ -54,6 +54,40 @@ def test_the_example_is_written_checked_and_planned(
     assert length.driving_s == 11 * 20.0 and length.else_s > 120.0
 
 
+def test_groups_are_printed_and_conditions_on_answers_are_checked(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What nobody is asked can neither exclude anybody nor decide on a question."""
+    fields = [{'name': 'age', 'number': {'low': 0, 'high': 99}}]
+    scale = {'name': 'mine', 'questions': [
+        {'name': 'often', 'likert': {'points': 5}, 'when': {'field': 'licence', 'equals': 1}},
+        {'name': 'why', 'text': {}, 'when': {'question': 'often', 'equals': 6}}]}
+    (tmp_path / 'mine.yaml').write_text(yaml.safe_dump(scale))
+    grouped: dict[str, Any] = {
+        'participants': 5, 'fields': fields, 'before': [{'questions': 'mine.yaml'}],
+        'groups': {'name': 'display', 'levels': [{'name': 'bars'}, {'name': 'lights'}],
+                   'strata': [{'field': 'age', 'cuts': [40]}]}}
+    text = told(study_of(tmp_path, **grouped, exclude=[
+        {'when': {'questionnaire': 'other', 'question': 'often', 'equals': 1}},
+        {'when': {'questionnaire': 'mine', 'question': 'why', 'at_least': 1}},
+        {'attention_failed': 1}]))
+    for fault in ('error: mine: often: when: "licence" is asked nowhere',
+                  'error: mine: why: when: 6 is no answer to "often"; give 1 to 5',
+                  'error: exclude[0]: "often" is asked nowhere',
+                  'error: exclude[1]: "why" has no numbers',
+                  'error: exclude[2]: no question has an expected answer',
+                  'warning: groups: 5 participants do not make 2 groups of equal size'):
+        assert fault in text
+    grouped['before'] = []
+    file = tmp_path / 'study.yaml'
+    file.write_text(yaml.safe_dump(PLAIN | grouped | {'participants': 4}))
+    assert main(['study', 'check', str(file), '--participants', '2']) == 0
+    out, err = capsys.readouterr()
+    assert 'warning' not in err
+    assert 'groups by display: randomly permuted blocks of 4, stratified by age' in out
+    assert [line for line in out.splitlines() if line.endswith(':')] == [
+        'bars, place 1:', 'bars, place 2:', 'lights, place 1:', 'lights, place 2:']
+
+
 def test_settings_cascade(tmp_path: Path) -> None:
     study = study_of(
         tmp_path, settings={'game': CUT_IN, 'duration': 2, 'planner': 'idm', 'seed': 3,

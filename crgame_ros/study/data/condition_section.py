@@ -328,21 +328,23 @@ def _groups(data: StudyData, conditions: tuple[str, ...], blocks: Sequence[str])
     html = f'<h3>By {free(groups.name)}</h3>' + note(
         'Means over the participants of each group. The intervals are Student’s, of each group '
         'alone: they are between participants, and also hold the spread of people.')
-    html += _tables(shown_measures(data, groups.names, blocks, itemgetter(column)), groups.names)
+    html += _tables(shown_measures(data, groups.names, blocks, itemgetter(column)), groups.names,
+                    f' by {groups.name}')
     if len(conditions) < 2:
         return html
     cells = tuple(f'{group}/{condition}' for group in groups.names for condition in conditions)
     return html + _tables(shown_measures(
-        data, cells, blocks, lambda row: f'{row[column]}/{row["condition"]}'), cells)
+        data, cells, blocks, lambda row: f'{row[column]}/{row["condition"]}'), cells,
+        f' by {groups.name} and condition')
 
 
-def _tables(shown: Sequence[ShownMeasure], conditions: Sequence[str]) -> str:
+def _tables(shown: Sequence[ShownMeasure], conditions: Sequence[str], words: str = '') -> str:
     html = ''
     if any(each.is_cut for each in shown):
         html += note('An interval that goes beyond the ends of its scale is drawn up to them.')
     for group in dict.fromkeys(each.group for each in shown):
         of_group = [each for each in shown if each.group == group]
-        html += table(f'{group}: means with 95 % intervals', (
+        html += table(f'{group}{words}: means with 95 % intervals', (
             '', 'unit', *(free(name) for name in conditions), 'n'),
             [_row(each) for each in of_group], 'numbers')
         html += '<div class="plots">' + ''.join(
