@@ -10,6 +10,7 @@ Write the types of the pages' messages in TypeScript from the classes that read 
 import argparse
 import json
 from pathlib import Path
+import re
 import sys
 from typing import Any
 
@@ -69,15 +70,25 @@ def declaration(name: str, schema: dict[str, Any]) -> str:
     """Return the type of a message or of a part of it; what has a default may be left out."""
     if schema.get('type') == 'array':
         # A NamedTuple: JSON Schema has the names of its entries as titles.
-        entries = [f'  {part["title"].lower().replace(" ", "_")}'
-                   f'{"?" if "default" in part else ""}: {typescript(part)},'
+        entries = [_folded(f'  {part["title"].lower().replace(" ", "_")}'
+                           f'{"?" if "default" in part else ""}: {typescript(part)},')
                    for part in schema['prefixItems']]
         return '\n'.join((f'\nexport type {name} = [', *entries, '];', ''))
     needed = {'type', *schema.get('required', ())}
-    lines = [f'  {key}{"" if key in needed else "?"}: {typescript(part)};'
+    lines = [_folded(f'  {key}{"" if key in needed else "?"}: {typescript(part)};')
              for key, part in schema['properties'].items()]
     first = schema['description'].splitlines()[0]
     return '\n'.join((f'\n/** {first} */', f'export interface {name} {{', *lines, '}', ''))
+
+
+def _folded(line: str) -> str:
+    """Return a line, continued below where it has too many columns, before a bar."""
+    rows = ['']
+    for part in re.split(r'(?= \| )', line):
+        if len(rows[-1]) + len(part) > WIDTH:
+            rows.append('   ')
+        rows[-1] += part
+    return '\n'.join(rows)
 
 
 def types_of(unions: dict[str, Any]) -> str:
@@ -88,12 +99,7 @@ def types_of(unions: dict[str, Any]) -> str:
         schema = TypeAdapter(union).json_schema()
         known |= schema['$defs']
         members = [typescript(part) for part in schema['anyOf']]
-        line = f'\nexport type {name} ='
-        for member in members:
-            if len(line.splitlines()[-1]) + len(member) + 4 > WIDTH:
-                line += '\n '
-            line += f' | {member}' if not line.endswith('=') else f' {member}'
-        ends += line + ';\n'
+        ends += '\n' + _folded(f'export type {name} = {" | ".join(members)};') + '\n'
     return HEAD + ''.join(declaration(name, known[name]) for name in sorted(known)) + ends
 
 

@@ -82,7 +82,7 @@ test('a mouse tells where the page is; a window that fills the screen has no pla
     [[100 + 430 - 380, 240 - 110], [100 + 430 - 380 - 30, 240 - 110 - 40]]);
 });
 
-test('ten pictures a second are told, none before the clocks are related or while unknown', async () => {
+test('ten pictures a second are told, none while the clocks are not related', async () => {
   for (let frame = 0; frame < 60; frame += 1) {
     teller.tell(frame * 1000 / 60, picture, 'hv0');
   }

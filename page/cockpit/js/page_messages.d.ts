@@ -150,7 +150,8 @@ export interface SeenView {
 }
 
 export type ShownThing = [
-  kind: 'vehicle' | 'pedestrian' | 'object' | 'sign' | 'traffic_light' | 'mirror' | 'instrument' | 'task',
+  kind: 'vehicle' | 'pedestrian' | 'object' | 'sign' | 'traffic_light' | 'mirror' | 'instrument'
+    | 'task',
   id: string,
   left: number,
   top: number,
@@ -228,5 +229,5 @@ export interface ViewTold {
 }
 
 export type PageMessage = Input | TaskDone | ViewTold | Claim | Release | Ask | HandOver | Answer
-  | Ready | Control | Rate | PlannerSwitch | Trigger | Person | Role | DeviceUsed | Name | Layers
-  | Sound | SeenView | Ping;
+    | Ready | Control | Rate | PlannerSwitch | Trigger | Person | Role | DeviceUsed | Name | Layers
+    | Sound | SeenView | Ping;

@@ -192,7 +192,8 @@ export class Picture {
     const { stand, inside, mirrors } = this.#last;
     const others = placed.filter(({ own }) => !own);
     const things = [...inside ? others : placed, ...this.#road.solids];
-    // Mirrors are drawn in turn, and look old by a picture or two; here they are as new as the view.
+    // Mirrors are drawn in turn, and look old by a picture or two; here they are as new as all
+    // else.
     const glasses = mirrors ? this.mirrors.all.flatMap(({ name, camera, rectangle, optics }) => {
       if (optics === null) {
         return [];

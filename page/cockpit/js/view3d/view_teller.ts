@@ -71,7 +71,10 @@ export class ViewTeller {
     const around = this.#stage.getBoundingClientRect();
     const entry = (kind: 'task' | 'instrument', id: string, node: Element | null) => {
       const rect = node?.getBoundingClientRect();
-      return rect === undefined || rect.width === 0 || rect.height === 0 ? [] : [thingOf(kind, id, {
+      if (rect === undefined || rect.width === 0 || rect.height === 0) {
+        return [];
+      }
+      return [thingOf(kind, id, {
         left: (rect.left - around.left) / around.width,
         top: (rect.top - around.top) / around.height,
         right: (rect.right - around.left) / around.width,
