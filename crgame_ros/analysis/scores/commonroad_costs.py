@@ -5,15 +5,19 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from itertools import chain
 import math
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from commonroad.common.solution import CostFunction, VehicleType
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.trajectory import Trajectory
 from crgame_ros.errors import one_line
+
+if TYPE_CHECKING:
+    from commonroad_dc.costs.evaluation import CostFunctionEvaluator, LaneletRouteMatcher
 
 _PATH_LENGTH = 'the code takes the path length L where the site has the offset from the lane'
 
@@ -81,21 +85,52 @@ def evaluate_costs(scenario: Scenario, problem: PlanningProblem, trajectory: Tra
     :param trajectory: states of the centre, as in CommonRoad's vehicle models.
     :param kind: vehicle type, which gives the width.
     """
-    from commonroad_dc.costs.route_matcher import LaneletRouteMatcher
-    found = tuple(_evaluate(scenario, problem, trajectory, kind, name) for name in names)
+    from commonroad_dc.costs.evaluation import (  # Takes seconds.
+        CostFunctionEvaluator,
+        LaneletRouteMatcher,
+    )
+    evaluators = [CostFunctionEvaluator(CostFunction[name], kind) for name in names]
+    along_lanes = _along_lanes(LaneletRouteMatcher(scenario, kind), trajectory, evaluators)
+    found = tuple(_evaluate(scenario, problem, trajectory, evaluator, along_lanes)
+                  for evaluator in evaluators)
     # The checker caches its last scenario until exit, at which its package would warn.
     LaneletRouteMatcher.scenario_cc.cache_clear()
     return found
 
 
-def _evaluate(scenario: Scenario, problem: PlanningProblem, trajectory: Trajectory,
-              kind: VehicleType, name: str) -> TrajectoryCost:
-    from commonroad_dc.costs.evaluation import CostFunctionEvaluator  # Takes seconds.
-    evaluator = CostFunctionEvaluator(CostFunction[name], kind)
+class _AlongLanes(NamedTuple):
+    """A trajectory in the coordinates of its lanes, and what cost functions ask of these."""
+
+    trajectory: Trajectory
+    properties: dict[Any, Any]
+
+
+def _along_lanes(matcher: 'LaneletRouteMatcher', trajectory: Trajectory,
+                 evaluators: Sequence['CostFunctionEvaluator']) -> _AlongLanes | None:
+    """Convert a trajectory once for all functions; None where a function asks for too much."""
+    asked = dict.fromkeys(chain.from_iterable(each.required_properties for each in evaluators))
     try:
-        found = evaluator.evaluate_pp_solution(scenario, problem, trajectory)
-        parts = {part.name: float(value) for part, value in found.partial_costs.items()}
-        total = float(found.total_costs)
+        converted, _, properties = matcher.compute_curvilinear_coordinates(
+            trajectory, required_properties=list(asked))
+    except Exception:  # the checker can raise any exception: each function then tells its own
+        return None
+    return _AlongLanes(converted, properties)
+
+
+def _evaluate(scenario: Scenario, problem: PlanningProblem, trajectory: Trajectory,
+              evaluator: 'CostFunctionEvaluator', along_lanes: _AlongLanes | None,
+              ) -> TrajectoryCost:
+    """Evaluate a function, as the checker's `evaluate_pp_solution` does."""
+    from commonroad_dc.costs.evaluation import PartialCostFunctionMapping
+    name = evaluator.cost_function_id.name
+    try:
+        if along_lanes is None:
+            costs = evaluator.evaluate_pp_solution(scenario, problem, trajectory).partial_costs
+        else:
+            costs = {part: PartialCostFunctionMapping[part](scenario, problem, *along_lanes)
+                     for part, _ in evaluator.partial_cost_funcs}
+        parts = {part.name: float(value) for part, value in costs.items()}
+        total = float(sum(costs[part] * weight for part, weight in evaluator.partial_cost_funcs))
     except Exception as error:  # the checker can raise any exception
         return TrajectoryCost(name, None, {}, _reason(error))
     if not math.isfinite(total):
