@@ -34,8 +34,12 @@ import pstats
 import statistics
 import subprocess
 import sys
-from typing import Any
+import tempfile
+from typing import Any, NamedTuple
 
+from commonroad.common.file_reader import CommonRoadFileReader
+import matplotlib as mpl
+from matplotlib import pyplot as plt
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'scripts'))
@@ -48,11 +52,10 @@ from crgame_ros.traffic.fleet.adoption import Adopted  # noqa: E402
 from crgame_ros.traffic.fleet.world_view import WorldView  # noqa: E402
 from crgame_ros.traffic.traffic import Traffic  # noqa: E402
 from scenario_traffic import BLOCK, LANE_WIDTH, loaded, motorway, town  # noqa: E402
+from scenario_xml import ScenarioFile, write  # noqa: E402
 from traffic_others import timed  # noqa: E402
 
 COUNTS = (10, 100, 1000, 10000)
-# The map of a larger one has more points than a scenario file may have.
-LARGEST_TOWN = 3000
 # Wanted at most, by agents [ms].
 WANTED = {10: 0.4, 1000: 4.0, 10000: 40.0}
 STEP_S, SUBSTEPS, LANES, LIMIT = 0.1, 10, 3, 120.0 / 3.6
@@ -62,6 +65,15 @@ AHEAD = 1500.0
 # Vehicles a crossing in town.
 PER_CROSSING = 8.0
 NONE = np.zeros((0, 3))
+
+
+class Row(NamedTuple):
+    """The median time of a step [ms] of a simulator with a number of vehicles somewhere."""
+
+    place: str
+    name: str
+    count: float
+    median_ms: float
 
 
 class Start:
@@ -102,7 +114,10 @@ def town_size(count: int) -> int:
 
 def our_town(count: int) -> Traffic:
     """Make agents that drive through a town; a new one spawns for each that leaves."""
-    scenario = loaded('Town', town(town_size(count))).scenario
+    # By CommonRoad's own reader: ours refuses a map with as many points as the largest has.
+    with tempfile.TemporaryDirectory() as folder:
+        scenario, _ = CommonRoadFileReader(write(ScenarioFile(
+            'ZAM_Town-1_1_T-1', town(town_size(count)), (), ('simulated',)), Path(folder))).open()
     spec = TrafficSpec(agents=count, flow=900.0, capacity=count)
     return Traffic(spec, RoadNetwork(scenario.lanelet_network), scenario, (), (), STEP_S,
                    SUBSTEPS, 0, 0)
@@ -162,26 +177,29 @@ def growth(counts: list[float], times: list[float]) -> str:
 
 
 def motorway_table(counts: tuple[int, ...], steps: int, python: str | None,
-                   highway_env_up_to: int) -> None:
+                   highway_env_up_to: int) -> list[Row]:
     """Measure on the motorway, ours and others in turns."""
-    ours = []
+    ours, rows = [], []
     for count in counts:
         start = Start(count)
         ours.append(report('motorway, ours', count, timed(
             stepper(our_motorway(start)), 30, steps, 60.0)))
+        rows.append(Row('motorway', 'crgame_ros', count, ours[-1]))
         given = {'lane': start.lane.tolist(), 'x': start.x.tolist(), 'lanes': LANES,
                  'speed': start.speed.tolist(), 'desired': start.desired.tolist(),
                  'limit': LIMIT, 'length': float(start.x.max()) + AHEAD}
         for name in ('sumo', 'highway-env'):
             if name == 'sumo' or count <= highway_env_up_to:
                 for who, present, times in others(python, name, 'motorway', given, steps):
-                    report(f'motorway, {who}', present, times, ours[-1])
+                    rows.append(Row('motorway', who, present, report(
+                        f'motorway, {who}', present, times, ours[-1])))
     print(f'time ~ n^p on the motorway: {growth([float(n) for n in counts], ours)}')
+    return rows
 
 
-def town_table(counts: tuple[int, ...], steps: int, python: str | None) -> None:
+def town_table(counts: tuple[int, ...], steps: int, python: str | None) -> list[Row]:
     """Measure in towns, ours and SUMO in turns."""
-    numbers, medians = [], []
+    numbers, medians, rows = [], [], []
     for count in counts:
         traffic = our_town(count)
         step = stepper(traffic)
@@ -191,10 +209,36 @@ def town_table(counts: tuple[int, ...], steps: int, python: str | None) -> None:
         times = timed(step, 0, steps, 60.0)
         numbers.append(0.5 * (before + present(traffic)))
         medians.append(report('town, ours', numbers[-1], times))
+        rows.append(Row('town', 'crgame_ros', numbers[-1], medians[-1]))
         given = {'size': town_size(count), 'block': BLOCK, 'count': count}
         for who, there, slow in others(python, 'sumo', 'town', given, steps):
-            report(f'town, {who}', there, slow, medians[-1])
+            rows.append(Row('town', who, there, report(
+                f'town, {who}', there, slow, medians[-1])))
     print(f'time ~ n^p in town: {growth(numbers, medians)}')
+    return rows
+
+
+def draw(rows: list[Row], path: Path) -> None:
+    """Draw the medians against the number of vehicles, beside lines of proportional growth."""
+    mpl.use('Agg')
+    places = list(dict.fromkeys(row.place for row in rows))
+    figure, axes = plt.subplots(1, len(places), figsize=(5.2 * len(places), 4.2), sharey=True,
+                                squeeze=False, layout='constrained')
+    for place, axis in zip(places, axes[0], strict=True):
+        here = [row for row in rows if row.place == place]
+        for name in dict.fromkeys(row.name for row in here):
+            line = [row for row in here if row.name == name]
+            axis.plot([row.count for row in line], [row.median_ms for row in line],
+                      marker='o', label=name, linewidth=2.0 if name == 'crgame_ros' else 1.2)
+        ends = np.array([min(row.count for row in here), max(row.count for row in here)])
+        for unit_us in (1.0, 10.0):
+            axis.plot(ends, ends * unit_us * 1e-3, color='0.75', linestyle=':', zorder=0)
+            axis.annotate(f'{unit_us:g} µs a vehicle', (ends[1], ends[1] * unit_us * 1e-3),
+                          color='0.5', ha='right', va='top', fontsize=8)
+        axis.set(xscale='log', yscale='log', title=place, xlabel='vehicles')
+        axis.legend(fontsize=8, loc='upper left')
+    axes[0, 0].set_ylabel('a step of 0.1 s, median [ms of processor time]')
+    figure.savefig(path, dpi=110)
 
 
 def profile(name: str, traffic: Traffic, steps: int) -> None:
@@ -222,6 +266,7 @@ def main() -> None:
     parser.add_argument('--highway-env-up-to', type=int, default=100,
                         help='vehicles of highway-env: its time grows with their square')
     parser.add_argument('--only', choices=('motorway', 'town'))
+    parser.add_argument('--picture', type=Path, metavar='FILE', help='draw the medians')
     parser.add_argument('--profile', action='store_true', help='where the time goes, instead')
     values = parser.parse_args()
     counts = tuple(values.counts)
@@ -236,11 +281,13 @@ def main() -> None:
         print('without SUMO and highway-env: name a Python that has them, --others (see --help)')
     print(f'{"a step of 0.1 s [ms]":34}{"agents":>7}{"least":>10}{"median":>10}{"worst":>10}'
           f'{"steps":>7}{"wanted":>9}{"/ ours":>9}')
+    rows = []
     if values.only != 'town':
-        motorway_table(counts, values.steps, values.others, values.highway_env_up_to)
+        rows += motorway_table(counts, values.steps, values.others, values.highway_env_up_to)
     if values.only != 'motorway':
-        town_table(tuple(count for count in counts if count <= LARGEST_TOWN), values.steps,
-                   values.others)
+        rows += town_table(counts, values.steps, values.others)
+    if values.picture is not None:
+        draw(rows, values.picture)
 
 
 if __name__ == '__main__':
