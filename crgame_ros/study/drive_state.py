@@ -5,6 +5,8 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from crgame_ros.study.quality import Excess
+
 
 class DrivePhase(StrEnum):
     """The phase of a drive."""
@@ -23,6 +25,18 @@ class DrivePhase(StrEnum):
     FAILED = 'failed'
 
 
+class DriveWork(StrEnum):
+    """Present work on a drive, or why there is none."""
+
+    NONE = ''
+    LOADING = 'loading'
+    # The data of the last drive do not hold.
+    AGAIN = 'again'
+    STOPPED = 'stopped'
+    RESTARTING = 'restarting'
+    NO_START = 'no_start'
+
+
 @dataclass(frozen=True)
 class DriveState:
     """
@@ -34,7 +48,8 @@ class DriveState:
     :param link: address of the cockpit's page for the participant; empty if not available.
     :param watch: address of a page that shows the drive; empty if not available.
     :param time_s: the run's clock [s]; None before the first cycle.
-    :param text: for the experimenter: the present work, or the failure.
+    :param work: for the experimenter: the present work.
+    :param text: for the experimenter: the failure, in the words of the program that failed.
     :param doubts: what of the drive's data is beyond a bound of the study so far.
     """
 
@@ -44,5 +59,6 @@ class DriveState:
     link: str = ''
     watch: str = ''
     time_s: float | None = None
+    work: DriveWork = DriveWork.NONE
     text: str = ''
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[Excess, ...] = ()

@@ -56,9 +56,10 @@ class QualityBounds:
         """Return their JSON form."""
         return asdict(self)
 
-    def faults(self, values: Mapping[str, Any], names: Mapping[str, 'Check']) -> list[str]:
+    def excesses(self, values: Mapping[str, Any], names: Mapping[str, 'Check']
+                 ) -> list['Excess']:
         """
-        Return one text for each value of a trial beyond its bound.
+        Return the values of a trial that are beyond their bounds.
 
         :param values: by the bounds' names; missing ones are not checked.
         :param names: the checks.
@@ -68,15 +69,19 @@ class QualityBounds:
             value, bound = values.get(name), getattr(self, name)
             if value is not None and bound is not None and (
                     value < bound if check.least else value > bound):
-                found.append(f'{check.words} {check.factor * value:.{check.digits}f}{check.suffix}'
-                             f' instead of {check.bound(bound)}')
+                found.append(Excess(name, check, value, bound))
         return found
 
-    def next_step(self, doubts: Sequence[str], repeats: int) -> Literal['count', 'repeat', 'stop']:
+    def faults(self, values: Mapping[str, Any], names: Mapping[str, 'Check']) -> list[str]:
+        """Return `excesses` as texts, one for each."""
+        return [str(excess) for excess in self.excesses(values, names)]
+
+    def next_step(self, doubts: Sequence['Excess'], repeats: int
+                  ) -> Literal['count', 'repeat', 'stop']:
         """
         Return what becomes of a drive that has ended.
 
-        :param doubts: `faults` of its values.
+        :param doubts: `excesses` of its values.
         :param repeats: how often it came again because of its data.
         """
         if not doubts or self.beyond == 'mark' or (
@@ -115,6 +120,28 @@ class Check(NamedTuple):
     def bound(self, bound: float) -> str:
         """Return a bound as text."""
         return f'at {"least" if self.least else "most"} {self.factor * bound:g}{self.suffix}'
+
+
+class Excess(NamedTuple):
+    """
+    A value beyond its bound.
+
+    :param name: of the bound.
+    :param check: of the bound.
+    :param value: of the trial, in the bound's unit.
+    :param bound: of the study.
+    """
+
+    name: str
+    check: Check
+    value: float
+    bound: float
+
+    def __str__(self) -> str:
+        """Return both as a text for tables and the journal."""
+        check = self.check
+        return (f'{check.words} {check.factor * self.value:.{check.digits}f}{check.suffix}'
+                f' instead of {check.bound(self.bound)}')
 
 
 # Of the simulation, from the recording.

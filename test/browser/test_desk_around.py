@@ -129,6 +129,38 @@ def test_the_experimenter_sees_and_directs(browser: Browser, tmp_path: Path) -> 
             'begun', 'marker', 'note', 'held', 'finished', 'skipped', 'held', 'repeated', 'ended']
 
 
+def test_the_experimenters_page_speaks_german(browser: Browser, tmp_path: Path) -> None:
+    """A choice on the page holds in this browser; what was typed stays, and so does the study."""
+    person = Participant(browser)
+    with running(tmp_path) as desk:
+        browser.open(desk.experimenter)
+        browser.wait('document.querySelectorAll("#items tr").length === 13')
+        assert browser.run('return document.documentElement.lang') == 'en'
+        person.press(Keys.F2)
+        browser.wait('document.getElementById("log").textContent.includes("marker: spoke")')
+        person.tab_to('#language')
+        person.press('d')
+        browser.wait('document.documentElement.lang === "de"')
+        browser.wait('document.getElementById("log").textContent.includes("Marker: spoke")')
+        browser.open(desk.experimenter.partition('?')[0])
+        browser.wait('document.querySelectorAll("#items tr").length === 13')
+        assert browser.run('return document.getElementById("language").value') == 'de'
+        assert browser.run(
+            'return [...document.querySelectorAll("[data-word]")].map((node) => node.textContent)'
+        ) == ['Journal herunterladen', 'Fahrt abbrechen', 'Schritt auslassen', 'Sitzung beenden',
+              'Fahrt ansehen', 'Notizen und Marker', 'Notiz, mit der Zeit und der Uhr des Laufs',
+              'Notiz speichern', 'Sitzung', 'Schritt', 'Was', 'Bedingung', 'Stand', 'Versuche',
+              'Protokoll']
+        assert browser.run('return document.getElementById("now-title").textContent'
+                           ) == 'Jetzt: zur Person (fields)'
+        give_order(person, 'Schritt auslassen', 'bekannt')
+        browser.wait('document.querySelector("#items tr").innerText'
+                     '.includes("ausgelassen: bekannt")')
+        assert not browser.console_errors()
+    # The participant's language is theirs.
+    assert not any(entry['entry'] == 'language' for entry in read_journal(tmp_path / 'P07'))
+
+
 def test_what_comes_again_is_asked_anew(browser: Browser, tmp_path: Path) -> None:
     """A questionnaire repeated from the gate after it has no answers and has new times."""
     person = Participant(browser)

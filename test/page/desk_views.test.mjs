@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Parts of the desk's pages: breaks, questions for a reason, drafts, and the journal's words. */
+/** Parts of the desk's pages: breaks, questions for a reason, drafts, and words. */
 
 import assert from 'node:assert/strict';
 import { setImmediate as soon } from 'node:timers/promises';
@@ -9,9 +9,11 @@ import { beforeEach, test } from 'node:test';
 import { breakView, clockTime } from '../../page/desk/js/break_view.js';
 import { Draft, draftName, forgetOtherDrafts } from
   '../../page/desk/js/draft.js';
+import { doubtWords, kindWords, stateWords } from '../../page/desk/js/item_words.js';
 import { entryWords, timeOfDay } from '../../page/desk/js/log_words.js';
 import { askReason } from '../../page/desk/js/reason_dialog.js';
 import { Words } from '../../page/desk/js/words.js';
+import { shippedWords } from './desk_words.mjs';
 import { click, expose, openPage, Pictures, textOf } from './dom_support.mjs';
 
 let root;
@@ -27,7 +29,7 @@ function rest(t, left_s, text = '') {
   const pictures = new Pictures();
   const words = new Words();
   words.load({ next: 'Next', break: 'Break', break_left: 'Not before {time}',
-    break_over: 'Go on whenever you are ready.' });
+    break_over: 'Go on whenever you are ready.' }, 'en');
   const done = [];
   const node = breakView({ text, left_s }, words, () => done.push(1));
   root.append(node);
@@ -81,7 +83,7 @@ const press = (text) => click([...dialog().querySelectorAll('button')].find(
 
 /** Ask for a reason; the promise is in an array, so that it is not awaited. */
 function ask(...more) {
-  return [askReason('End <b>it</b>?', 'It cannot be undone.', 'End', ...more)];
+  return [askReason(shippedWords('en'), 'End <b>it</b>?', 'It cannot be undone.', 'End', ...more)];
 }
 
 test('an order with a reason gives the reason, without blanks around it', async () => {
@@ -184,31 +186,82 @@ test('the drafts of other items are forgotten, and nothing else is', () => {
   assert.deepEqual(new Draft(here, () => 9).answers, { age: 42 });
 });
 
-test('entries of the journal are told in one line each', () => {
+const LANGUAGES = ['en', 'de'];
+
+test('entries of the journal are told in one line each, typed text as it was typed', () => {
   const drive = { time_s: 12.34, run: 'run_2' };
   const cases = [
     [{ entry: 'note', item: 'main/1', text: '<i>sleepy</i>', ...drive },
-      'note at 12.3 s of run_2: <i>sleepy</i>'],
-    [{ entry: 'note', item: '', text: 'late', time_s: null }, 'note: late'],
-    [{ entry: 'marker', name: 'spoke', ...drive }, 'marker at 12.3 s of run_2: spoke'],
-    [{ entry: 'marker', name: 'spoke' }, 'marker: spoke'],
-    [{ entry: 'language', language: 'de' }, 'language: de'],
-    [{ entry: 'held', held: true }, 'held before the next item'],
-    [{ entry: 'held', held: false }, 'goes on'],
-    [{ entry: 'begun' }, 'session begun'],
-    [{ entry: 'ended', reason: 'asked to stop' }, 'session ended: asked to stop'],
+      'note at 12.3 s of run_2: <i>sleepy</i>', 'Notiz bei 12,3 s von run_2: <i>sleepy</i>'],
+    [{ entry: 'note', item: '', text: 'late {item}', time_s: null },
+      'note: late {item}', 'Notiz: late {item}'],
+    [{ entry: 'marker', name: 'spoke', ...drive },
+      'marker at 12.3 s of run_2: spoke', 'Marker bei 12,3 s von run_2: spoke'],
+    [{ entry: 'marker', name: 'spoke' }, 'marker: spoke', 'Marker: spoke'],
+    [{ entry: 'language', language: 'de' }, 'language: de', 'Sprache: de'],
+    [{ entry: 'held', held: true },
+      'held before the next item', 'vor dem nächsten Schritt angehalten'],
+    [{ entry: 'held', held: false }, 'goes on', 'geht weiter'],
+    [{ entry: 'begun' }, 'session begun', 'Sitzung begonnen'],
+    [{ entry: 'opened' }, 'program started', 'Programm gestartet'],
+    [{ entry: 'allocated', group: 'bars', place: 2 },
+      'group bars, place 3 in it', 'Gruppe bars, Platz 3 darin'],
+    [{ entry: 'ended', reason: 'asked to stop' },
+      'session ended: asked to stop', 'Sitzung beendet: asked to stop'],
     [{ entry: 'started', item: 'main/1', attempt: 2, run: 'run_3' },
-      'started main/1, attempt 2, run_3'],
-    [{ entry: 'started', item: 'main/1', attempt: 1 }, 'started main/1, attempt 1'],
-    [{ entry: 'practised', item: 'p/1', good: true }, 'practised p/1: good'],
-    [{ entry: 'practised', item: 'p/1', good: false }, 'practised p/1: not good'],
-    [{ entry: 'finished', item: 'before/1', answers: { age: 42 } }, 'finished before/1'],
-    [{ entry: 'finished', item: 'main/1', outcome: 'time' }, 'finished main/1: time'],
-    [{ entry: 'skipped', item: 'before/2', reason: 'asked' }, 'skipped before/2: asked'],
-    [{ entry: 'repeated', item: 'x', reason: '', outcome: 'y' }, 'repeated x: '],
-    [{ entry: 'aborted', reason: 'ill' }, 'aborted: ill']];
-  assert.deepEqual(cases.map(([entry]) => entryWords({ at: 1, ...entry })),
-    cases.map(([, text]) => text));
+      'started main/1, attempt 2, run_3', 'main/1 begonnen, Versuch 2, run_3'],
+    [{ entry: 'started', item: 'main/1', attempt: 1 },
+      'started main/1, attempt 1', 'main/1 begonnen, Versuch 1'],
+    [{ entry: 'practised', item: 'p/1', good: true }, 'practised p/1: good', 'p/1 geübt: gut'],
+    [{ entry: 'practised', item: 'p/1', good: false },
+      'practised p/1: not good', 'p/1 geübt: nicht gut'],
+    [{ entry: 'finished', item: 'before/1', answers: { age: 42 } },
+      'finished before/1', 'before/1 fertig'],
+    [{ entry: 'finished', item: 'main/1', outcome: 'time' },
+      'finished main/1: time', 'main/1 fertig: Zeit'],
+    [{ entry: 'skipped', item: 'before/2', reason: 'asked' },
+      'skipped before/2: asked', 'before/2 ausgelassen: asked'],
+    [{ entry: 'repeated', item: 'x', reason: '', outcome: 'y' }, 'repeated x: ', 'x wiederholt: '],
+    [{ entry: 'aborted', reason: 'ill' }, 'aborted: ill', 'abgebrochen: ill']];
+  for (const [index, language] of LANGUAGES.entries()) {
+    const words = shippedWords(language);
+    assert.deepEqual(cases.map(([entry]) => entryWords({ at: 1, ...entry }, words)),
+      cases.map((told) => told[1 + index]));
+  }
+});
+
+const RATE = { check: 'view_rate_hz', value: 10, bound: 20, unit: '', digits: 1, least: true };
+const AWAY = { check: 'away_s', value: 1.27, bound: 0.5, unit: 's', digits: 1, least: false };
+const CYCLES = { check: 'timeout_ratio', value: 12.345, bound: 100 * 0.07, unit: '%', digits: 1,
+  least: false };
+
+test('what is beyond a bound is told with the bound, as the journal tells it in English', () => {
+  const told = LANGUAGES.map((language) => [RATE, AWAY, CYCLES].map((doubt) => doubtWords(
+    doubt, shippedWords(language))));
+  assert.deepEqual(told, [
+    ['pictures a second 10.0 instead of at least 20',
+      'page hidden or without the focus 1.3 s instead of at most 0.5 s',
+      'cycles that took longer than a step 12.3 % instead of at most 7 %'],
+    ['Bilder in der Sekunde 10,0 statt mindestens 20',
+      'Seite verdeckt oder ohne Fokus 1,3 s statt höchstens 0,5 s',
+      'Zyklen länger als ein Schritt 12,3 % statt höchstens 7 %']]);
+});
+
+test('an item has its kind and its state, with the outcome, the reason or the doubts', () => {
+  const row = { outcome: '', reason: '', doubts: [] };
+  const rows = [
+    [{ ...row, kind: 'drive', what: '3', state: 'finished', outcome: 'time', doubts: [RATE] },
+      'drive 3', 'finished: time; pictures a second 10.0 instead of at least 20',
+      'Fahrt 3', 'fertig: Zeit; Bilder in der Sekunde 10,0 statt mindestens 20'],
+    [{ ...row, kind: 'break', what: '0.5', state: 'skipped', reason: 'not {what}' },
+      'break 0.5 min', 'skipped: not {what}', 'Pause 0,5 min', 'ausgelassen: not {what}'],
+    [{ ...row, kind: 'fields', what: '', state: 'to_come' },
+      'about the participant', 'to come', 'zur Person', 'kommt noch']];
+  for (const [index, language] of LANGUAGES.entries()) {
+    const words = shippedWords(language);
+    assert.deepEqual(rows.map(([shown]) => [kindWords(shown, words), stateWords(shown, words)]),
+      rows.map((told) => told.slice(1 + 2 * index, 3 + 2 * index)));
+  }
 });
 
 test('the time of day has hours to 24, minutes and seconds', () => {

@@ -33,7 +33,7 @@ beforeEach(() => {
   root = openPage();
   expose('sessionStorage', 'HTMLTextAreaElement');
   words = new Words();
-  words.load(TABLE);
+  words.load(TABLE, 'en');
   [now_s, told] = [1000, []];
 });
 

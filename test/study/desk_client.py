@@ -53,6 +53,10 @@ class Served:
         """Open the experimenter's page."""
         async with self.http.get(self.experimenter) as answer:
             assert answer.status == 200
+        return await self.direct_again()
+
+    async def direct_again(self) -> ClientWebSocketResponse:
+        """Open another page of the experimenter, in the same browser."""
         return await self.http.ws_connect(f'{self.root}/ws/experimenter')
 
 

@@ -10,6 +10,7 @@ import sys
 
 from aiohttp import ClientSession, CookieJar, WSMsgType, WSServerHandshakeError
 from crgame_ros.study.desk.pages import words_of
+from crgame_ros.study.desk.participant_document import experimenter_document
 from crgame_ros.study.desk.server import MAX_MALFORMED
 import pytest
 
@@ -146,7 +147,7 @@ async def test_orders_of_the_experimenter(tmp_path: Path) -> None:
         assert (await do(director, {'type': 'skip', 'item': 'fields', 'reason': 'known'}))['ok']
         document = await shown(director, lambda content: content.get('item') == 'main/1')
         rows = {row['id']: row for row in document['items']}
-        assert (rows['fields']['state'], rows['fields']['outcome']) == ('skipped', 'known')
+        assert (rows['fields']['state'], rows['fields']['reason']) == ('skipped', 'known')
         assert (rows['main/1']['state'], rows['main/1']['attempts']) == ('now', 1)
         assert rows['main/1']['condition'] in ('a', 'b')
         assert document['page']['connected'] and document['drive']['phase'] == 'ready'
@@ -204,6 +205,48 @@ async def test_a_page_that_says_nothing_is_silent_and_its_delays_are_unknown(
         assert page['round_trip_ms'] == 12.5 and page['seated'] is True
         await socket.close()
         await director.close()
+
+
+@in_loop
+async def test_an_experimenters_page_has_a_language_of_its_own(tmp_path: Path) -> None:
+    """Words that cannot be read are replaced, so that the page can show what is wrong."""
+    async with served(tmp_path) as running:
+        study = running.desk.session.study
+        (study.base / 'words.it.yaml').write_text('desk_log: Registro\n', encoding='utf-8')
+        (study.base / 'words.fr.yaml').write_text('nothing: rien\n', encoding='utf-8')
+        first, second = await running.direct(), await running.direct_again()
+        for socket, wanted, language, log in (
+                (first, 'de', 'de', 'Protokoll'), (second, 'it', 'it', 'Registro'),
+                (second, 'xx', 'en', 'Log'), (second, '../it', 'en', 'Log'),
+                (second, 'fr', 'en', 'Log')):
+            await socket.send_json({'type': 'language', 'language': wanted})
+            told = await shown(socket, lambda content: content['type'] == 'words')
+            assert (told['language'], told['words']['desk_log']) == (language, log)
+            assert told['languages'] == ['de', 'en', 'fr', 'it']
+        # The participant has not chosen yet, and the other page keeps its words.
+        assert running.desk.session.language is None
+        assert (await do(first, {'type': 'note', 'text': 'Grüße'}))['ok']
+        for socket in (first, second):
+            await socket.close()
+
+
+@in_loop
+async def test_what_a_drive_leaves_in_doubt_is_told_by_its_numbers(tmp_path: Path) -> None:
+    """From the journal; values that another program has spoiled are left out."""
+    async with served(tmp_path, languages=[], fields=[], before=[]) as running:
+        session, socket = running.desk.session, await running.join()
+        await do_until(running, socket, 'main/1')
+        session.start('runs/1')
+        session.finish(outcome='time', quality={'away_s': 1.27, 'resets': 'many', 'stimuli': 3},
+                       doubts=['page hidden or without the focus 1.3 s instead of at most 0.5 s'])
+        session.journal.entries[-1]['quality']['device_changes'] = float('inf')
+        row = next(row for row in experimenter_document(running.desk, {})['items']
+                   if row['id'] == 'main/1')
+        assert (row['state'], row['outcome'], row['kind'], row['what']) == (
+            'finished', 'time', 'drive', '1')
+        assert row['doubts'] == [{'check': 'away_s', 'value': 1.27, 'bound': 0.5, 'unit': 's',
+                                  'digits': 1, 'least': False}]
+        await socket.close()
 
 
 @in_loop

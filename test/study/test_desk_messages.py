@@ -4,13 +4,19 @@
 
 import json
 from pathlib import Path
+import re
 import sys
 
 from crgame_ros.errors import InputError
+from crgame_ros.paths import page_directory
 from crgame_ros.study.desk.messages import Finish, Note, parse_experimenter, parse_participant
 from crgame_ros.study.desk.page_markdown import picture, read_tree
-from crgame_ros.study.desk.pages import words_of
+from crgame_ros.study.desk.pages import languages_of, WORDS, words_of
+from crgame_ros.study.drive_state import DrivePhase, DriveWork
 from crgame_ros.study.file import Page
+from crgame_ros.study.quality import PAGE, TIMING
+from crgame_ros.study.session_journal import SessionEvent
+from crgame_ros.yaml_text import read_yaml
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -77,7 +83,39 @@ def test_words_of_another_language_come_from_a_file(tmp_path: Path) -> None:
     (study.base / 'words.fr.yaml').write_text('next: Continuer\n', encoding='utf-8')
     french = words_of(study, 'fr')
     assert french['next'] == 'Continuer' and french['agree'] == 'I agree'
-    assert words_of(study, 'de').keys() == words_of(study, 'en').keys()
+    assert languages_of(study) == ['de', 'en', 'fr']
     (study.base / 'words.it.yaml').write_text('nxet: Avanti\n', encoding='utf-8')
     with pytest.raises(InputError, match='no word of the page'):
         words_of(study, 'it')
+
+
+def test_all_words_are_in_each_language_with_the_same_gaps_to_fill() -> None:
+    """The English words are those that journal and tables have, the same for each value."""
+    english, *others = (read_yaml(WORDS / f'{name}.yaml', 'words') for name in ('en', 'de'))
+    for words in others:
+        assert list(words) == list(english)
+        assert {key: set(re.findall(r'{\w+}', text)) for key, text in words.items()} == {
+            key: set(re.findall(r'{\w+}', text)) for key, text in english.items()}
+    assert {f'phase_{phase}' for phase in DrivePhase} == _begin('phase_', english)
+    assert {f'work_{work}' for work in DriveWork if work} == _begin('work_', english)
+    told = {f'log_{event}' for event in SessionEvent}
+    assert told <= english.keys() and {'log_released', 'log_at'} < _begin('log_', english) - told
+    assert {f'check_{name}': check.words for name, check in {**TIMING, **PAGE}.items()} == {
+        key: english[key] for key in _begin('check_', english)}
+
+
+def _begin(how: str, words: dict[str, str]) -> set[str]:
+    return {key for key in words if key.startswith(how)}
+
+
+def test_words_that_the_pages_name_are_there_and_the_experimenters_are_all_used() -> None:
+    """Some are named by a code of the server: how a session ended, and orders."""
+    words = read_yaml(WORDS / 'en.yaml', 'words')
+    pages = page_directory() / 'desk'
+    text = '\n'.join(path.read_text(encoding='utf-8') for path in (
+        *pages.glob('*.html'), *pages.glob('js/*.ts')))
+    named = set(re.findall(r"(?:words\.of\(|data-word=)\s*['\"](\w+)['\"]", text))
+    assert len(named) > 50 and named <= words.keys()
+    orders = {'desk_abort', 'desk_abort_text', 'desk_skip', 'desk_skip_text'}
+    ends = {f'desk_over_{how}' for how in ('done', 'declined', 'excluded', 'ended')}
+    assert _begin('desk_', words) - set(re.findall(r'\w+', text)) == orders | ends

@@ -24,10 +24,10 @@ from crgame_ros.study.conduct.study_drive import (
     write_drive,
 )
 from crgame_ros.study.conduct.study_graph import StudyGraph
-from crgame_ros.study.drive_state import DrivePhase, DriveState
+from crgame_ros.study.drive_state import DrivePhase, DriveState, DriveWork
 from crgame_ros.study.drive_watch import DriveWatch
 from crgame_ros.study.participant_session import ParticipantSession
-from crgame_ros.study.quality import PAGE, TIMING
+from crgame_ros.study.quality import Excess, PAGE, TIMING
 from crgame_ros.study.session_journal import SessionEvent
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
@@ -173,7 +173,7 @@ class LiveDrives:
         if self._loaded is not None and self._loaded.item.id == item.id:
             return self._loaded
         if self._is_due(item):
-            self._set_phase(DrivePhase.PREPARING, item.id, 'the game is loaded')
+            self._set_phase(DrivePhase.PREPARING, item.id, work=DriveWork.LOADING)
         drive = write_drive(item, self._folder / 'games')
         assert drive is not None
         if self._graph is None:
@@ -240,11 +240,11 @@ class LiveDrives:
         await self._until(lambda: _is_closed(folder), CLOSES_S, 'the recording is not closed')
         watch.add_timing(director.status.timing)
         doubts = self._doubts(watch)
-        told |= {'quality': watch.values(), 'doubts': list(doubts)}
+        told |= {'quality': watch.values(), 'doubts': list(map(str, doubts))}
         step = session.study.quality.next_step(doubts, self._repeats(item))
         if isinstance(item.what, PlannedTrial) and step == 'repeat':
-            session.abort(f'{DOUBTFUL}{"; ".join(doubts)}', item.id)
-            self._set_phase(DrivePhase.PREPARING, item.id, 'the drive comes again')
+            session.abort(f'{DOUBTFUL}{"; ".join(map(str, doubts))}', item.id)
+            self._set_phase(DrivePhase.PREPARING, item.id, work=DriveWork.AGAIN)
             return
         if isinstance(item.what, PracticeDrives):
             wanted_s = item.what.practice.seconds
@@ -256,8 +256,8 @@ class LiveDrives:
             session.finish(**told)
         self._set_phase(DrivePhase.NONE)
 
-    def _doubts(self, watch: DriveWatch) -> tuple[str, ...]:
-        return tuple(self._session.study.quality.faults(watch.values(), {**TIMING, **PAGE}))
+    def _doubts(self, watch: DriveWatch) -> tuple[Excess, ...]:
+        return tuple(self._session.study.quality.excesses(watch.values(), {**TIMING, **PAGE}))
 
     def _tell_doubts(self, watch: DriveWatch) -> None:
         """Tell what is beyond a bound as soon as it is."""
@@ -276,7 +276,7 @@ class LiveDrives:
         """End a run that does not count: it was aborted, or its item was skipped."""
         director = self._directs()
         self._session.abort(reason or 'the session went on with something else', item.id)
-        self._set_phase(DrivePhase.PREPARING, item.id, 'the drive was ended')
+        self._set_phase(DrivePhase.PREPARING, item.id, work=DriveWork.STOPPED)
         if director.status.run != 'ended':
             await director.stop()
         await self._until(lambda: director.status.run == 'ended', CLOSES_S,
@@ -290,14 +290,14 @@ class LiveDrives:
         item = self._state.item
         if self._is_under_way:
             self._session.abort(f'the simulation ended by itself: {words}', item)
-        self._set_phase(DrivePhase.PREPARING, item, f'the simulation is started again: {words}')
+        self._set_phase(DrivePhase.PREPARING, item, words, work=DriveWork.RESTARTING)
         await self.close()
-        self._set_phase(DrivePhase.PREPARING, item, f'the simulation is started again: {words}')
+        self._set_phase(DrivePhase.PREPARING, item, words, work=DriveWork.RESTARTING)
         now_s = time.monotonic()
         self._deaths_s = [at for at in self._deaths_s if now_s - at < DEATHS_S] + [now_s]
         if len(self._deaths_s) >= MAX_DEATHS:
             self._deaths_s.clear()
-            self._set_phase(DrivePhase.FAILED, item, f'the simulation does not start: {words}')
+            self._set_phase(DrivePhase.FAILED, item, words, work=DriveWork.NO_START)
             await self._wait()
 
     async def _fail(self, item: SessionItem, text: str) -> None:
@@ -340,13 +340,14 @@ class LiveDrives:
         while not self._news.is_set():
             await self._poll()
 
-    def _set_phase(self, phase: DrivePhase, item: str = '', text: str = '', *, attempt: int = 0,
+    def _set_phase(self, phase: DrivePhase, item: str = '', text: str = '', *,
+                   work: DriveWork = DriveWork.NONE, attempt: int = 0,
                    drive: StudyDrive | None = None) -> None:
         link = watch = ''
         if drive is not None and self._graph is not None:
             link = drive.link(self._graph.cockpit, self._language(), self._key)
             watch = drive.watch_link(self._graph.cockpit)
-        state = DriveState(phase, item, attempt, link, watch, None, text)
+        state = DriveState(phase, item, attempt, link, watch, None, work, text)
         if state != self._state:
             self._state = state
             self._tell()

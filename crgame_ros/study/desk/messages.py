@@ -63,7 +63,7 @@ class Here(Message):
 
 
 class Language(Message):
-    """The participant's language."""
+    """The language of the participant, or of the experimenter's page."""
 
     type: Literal['language'] = 'language'  # noqa: A003
     language: Annotated[Words, StringConstraints(max_length=20)]
@@ -154,7 +154,7 @@ class Hold(Order):
 
 ParticipantMessage = Hello | Here | Language | Ready | Finish | Ping
 ExperimenterOrder = Note | Mark | Reasoned | End | Hold
-ExperimenterMessage = ExperimenterOrder | Ping
+ExperimenterMessage = ExperimenterOrder | Language | Ping
 _PARTICIPANT: MessageReader[ParticipantMessage] = MessageReader(ParticipantMessage)
 _EXPERIMENTER: MessageReader[ExperimenterMessage] = MessageReader(ExperimenterMessage)
 

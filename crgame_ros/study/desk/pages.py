@@ -7,6 +7,7 @@ from functools import cache
 import json
 import logging
 from pathlib import Path
+import re
 
 from crgame_ros.cockpit.client import Client
 from crgame_ros.errors import CrgameError, InputError
@@ -33,6 +34,7 @@ from crgame_ros.yaml_text import read_yaml
 
 WORDS = Path(__file__).resolve().parent / 'words'
 STANDARD = 'en'
+_LANGUAGE = re.compile('[a-z]{2,3}')
 
 
 def words_of(study: StudyFile, language: str) -> dict[str, str]:
@@ -53,6 +55,13 @@ def words_of(study: StudyFile, language: str) -> dict[str, str]:
                                  str(file), f'take the keys of {STANDARD}.yaml')
             words |= given
     return words
+
+
+def languages_of(study: StudyFile) -> list[str]:
+    """Return the languages that have words: this package's, and those beside a study's file."""
+    names = (path.stem.removeprefix('words.') for path in (
+        *WORDS.glob('*.yaml'), *study.base.glob('words.*.yaml')))
+    return sorted({name for name in names if _LANGUAGE.fullmatch(name)})
 
 
 @cache
@@ -187,6 +196,9 @@ class DeskPages:
         if isinstance(message, Ping):
             self._answer(client, message)
             return
+        if isinstance(message, Language):
+            self._word_experimenter(client, message.language)
+            return
         ok, text = True, ''
         try:
             self._order(message)
@@ -239,8 +251,22 @@ class DeskPages:
         language = self.desk.language
         if self._worded.get(client) != language:
             self._worded[client] = language
-            client.put_event(_text({'type': 'words',
+            client.put_event(_text({'type': 'words', 'language': language,
                                     'words': words_of(self.desk.session.study, language)}))
+
+    def _word_experimenter(self, client: Client, wanted: str) -> None:
+        """Send the words of an experimenter's page, which has a language of its own."""
+        study = self.desk.session.study
+        languages = languages_of(study)
+        language = wanted if wanted in languages else STANDARD
+        try:
+            words = words_of(study, language)
+        except InputError as error:
+            # Without its words the page could not show what is wrong with them.
+            _log.error('%s', error)
+            language, words = STANDARD, _read(WORDS / f'{STANDARD}.yaml')
+        client.put_event(_text({'type': 'words', 'language': language, 'languages': languages,
+                                'words': words}))
 
     def _send_participant(self, client: Client) -> None:
         if not self._participants.get(client):

@@ -4,6 +4,7 @@
 
 from collections import Counter
 from collections.abc import Mapping
+import math
 from typing import Any
 
 from crgame_ros.study.answer_condition import AnswerCondition, holds_for
@@ -13,6 +14,7 @@ from crgame_ros.study.drive_state import DrivePhase
 from crgame_ros.study.file import Break, DeviceCheck, Page, Questions
 from crgame_ros.study.pages import questionnaire_name
 from crgame_ros.study.participant_session import ParticipantSession
+from crgame_ros.study.quality import Excess, PAGE, QualityBounds, TIMING
 from crgame_ros.study.question import (
     ChoiceQuestion,
     LikertQuestion,
@@ -203,10 +205,24 @@ def experimenter_document(desk: Desk, page: Mapping[str, object]) -> dict[str, o
         'waits': desk.waits, 'ending': desk.ending,
         'over': how_over(desk) if item is None else '', 'can_abort': desk.can_abort,
         'drive': {'phase': state.phase.value, 'item': state.item, 'attempt': state.attempt,
-                  'time_s': state.time_s, 'text': state.text, 'doubts': list(state.doubts),
-                  'watch': state.watch},
+                  'time_s': state.time_s, 'work': state.work.value, 'text': state.text,
+                  'doubts': list(map(_doubt, state.doubts)), 'watch': state.watch},
         'pause_h': _pause_h(session),
         'items': _items(desk), 'log': _log(desk)}
+
+
+def _doubt(excess: Excess) -> dict[str, object]:
+    check = excess.check
+    return {'check': excess.name, 'value': check.factor * excess.value,
+            'bound': check.factor * excess.bound, 'unit': check.unit, 'digits': check.digits,
+            'least': check.least}
+
+
+def _doubts_of(entry: Mapping[str, Any], quality: QualityBounds) -> list[dict[str, object]]:
+    """Return what of a finished drive's values is beyond a bound, without what is no number."""
+    values = {name: value for name, value in (entry.get('quality') or {}).items()
+              if isinstance(value, int | float) and math.isfinite(value)}
+    return list(map(_doubt, quality.excesses(values, {**TIMING, **PAGE})))
 
 
 def _pause_h(session: ParticipantSession) -> float:
@@ -222,7 +238,7 @@ def _items(desk: Desk) -> list[dict[str, object]]:
     session = desk.session
     attempts: Counter[str] = Counter()
     states: dict[str, str] = {}
-    outcomes: dict[str, str] = {}
+    ends: dict[str, dict[str, object]] = {}
     for entry in session.journal.entries:
         name = entry.get('item', '')
         match entry['entry']:
@@ -230,36 +246,39 @@ def _items(desk: Desk) -> list[dict[str, object]]:
                 attempts[name] += 1
             case SessionEvent.FINISHED | SessionEvent.SKIPPED:
                 states[name] = entry['entry']
-                outcomes[name] = '; '.join((str(entry.get('outcome', entry.get('reason', ''))),
-                                            *map(str, entry.get('doubts') or ())))[:LONGEST]
+                ends[name] = {'outcome': entry.get('outcome') or '',
+                              'reason': (entry.get('reason') or '')[:LONGEST],
+                              'doubts': _doubts_of(entry, session.study.quality)}
             case SessionEvent.REPEATED:
                 states.pop(name, None)
-                outcomes.pop(name, None)
-    now = session.next_item
-    return [{'id': item.id, 'kind': kind_of(item), 'attempts': attempts[item.id],
+                ends.pop(name, None)
+    now, without = session.next_item, {'outcome': '', 'reason': '', 'doubts': []}
+    return [{'id': item.id, **kind_of(item), 'attempts': attempts[item.id],
              'condition': item.what.condition.name if isinstance(item.what, PlannedTrial) else '',
              'trial': item.what.number if isinstance(item.what, PlannedTrial) else item.trial,
-             'outcome': outcomes.get(item.id, ''),
+             **ends.get(item.id, without),
              'state': 'now' if now is not None and item.id == now.id
-             else states.get(item.id, 'to come')} for item in session.items]
+             else states.get(item.id, 'to_come')} for item in session.items]
 
 
-def kind_of(item: SessionItem) -> str:
-    """Return a short description of an item."""
-    what = item.what
-    if isinstance(what, PlannedTrial):
-        return f'drive {what.number}'
-    if isinstance(what, PracticeDrives):
-        return 'practice'
-    if isinstance(what, Fields):
-        return 'about the participant'
-    if isinstance(what, Page):
-        return f'consent {what.file}' if what.consent else f'page {what.file}'
-    if isinstance(what, Break):
-        return f'break {what.minutes:g} min'
-    if isinstance(what, DeviceCheck):
-        return 'device check'
-    return f'questions {what.name}'
+def kind_of(item: SessionItem) -> dict[str, str]:
+    """Return the kind of an item, and which one of its kind it is: `kind` and `what`."""
+    match item.what:
+        case PlannedTrial(number=number):
+            kind, what = 'drive', f'{number}'
+        case PracticeDrives():
+            kind, what = 'practice', ''
+        case Fields():
+            kind, what = 'fields', ''
+        case Page(file=file, consent=consent):
+            kind, what = 'consent' if consent else 'page', file
+        case Break(minutes=minutes):
+            kind, what = 'break', f'{minutes:g}'
+        case DeviceCheck():
+            kind, what = 'device', ''
+        case Questions(name=name):
+            kind, what = 'questions', name
+    return {'kind': kind, 'what': what}
 
 
 def _log(desk: Desk) -> list[dict[str, object]]:

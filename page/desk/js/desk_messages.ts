@@ -98,7 +98,7 @@ export interface DriveDocument extends Always {
 export type DeskDocument = PlainDocument | WaitDocument | OverDocument | QuestionsDocument
   | PageDocument | BreakDocument | DeviceDocument | DriveDocument;
 export type WordTable = Record<string, string>; // the page's own words, by their key
-export interface WordsMessage { type: 'words'; words: WordTable }
+export interface WordsMessage { type: 'words'; language: string; words: WordTable }
 export interface RefusedMessage { type: 'refused'; item: string; text: string }
 /** `at` is the server's clock [s]. */
 export interface PongMessage { type: 'pong'; t: number; at: number }

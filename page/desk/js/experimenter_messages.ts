@@ -2,14 +2,32 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The messages from the server to the experimenter's page. */
 
+import type { WordsMessage } from './desk_messages.js';
+
+/** The page's words, and the languages that have some. */
+export interface ExperimenterWords extends WordsMessage { languages: string[] }
+
+/** A value of a drive that is beyond its bound, both in the unit. */
+export interface Doubt {
+  check: string;
+  value: number;
+  bound: number;
+  unit: string;
+  digits: number; // of the value behind its decimal mark
+  least: boolean; // whether the bound is the least value, not the largest
+}
+
 export interface ItemRow {
   id: string;
   kind: string;
+  what: string; // which one of its kind
   attempts: number;
   condition: string;
   trial: number | null;
   outcome: string;
-  state: 'now' | 'to come' | 'finished' | 'skipped';
+  reason: string;
+  doubts: Doubt[];
+  state: 'now' | 'to_come' | 'finished' | 'skipped';
 }
 
 export interface ParticipantPage {
@@ -27,8 +45,9 @@ export interface DriveNow {
   item: string;
   attempt: number;
   time_s: number | null;
-  text: string;
-  doubts: string[]; // what of its data is beyond a bound of the study
+  work: string; // present work; empty without
+  text: string; // a failure, in the words of the program that failed
+  doubts: Doubt[]; // what of its data is beyond a bound of the study
   watch: string; // address of a page that shows the drive; empty for none
 }
 

@@ -3,25 +3,29 @@
 /** Journal entries as one line each. */
 
 import type { LogEntry } from './experimenter_messages.js';
+import type { Words } from './words.js';
 
-/** Return an entry as text. */
-export function entryWords(entry: LogEntry): string {
+/** Return an entry as text; what people typed, and reasons, stay as they are in the journal. */
+export function entryWords(entry: LogEntry, words: Words): string {
   const { entry: kind, item, time_s, run, ...rest } = entry;
-  const clock = typeof time_s === 'number' ? ` at ${time_s.toFixed(1)} s of ${run}` : '';
-  const of = typeof item === 'string' && item ? ` ${item}` : '';
+  const clock = typeof time_s === 'number'
+    ? ` ${words.of('log_at', { seconds: words.number(time_s, 1), run: `${run}` })}` : '';
+  // Some entries are of no item.
+  const what = words.of(`log_${kind}`, { item: typeof item === 'string' ? item : '' }).trim();
   switch (kind) {
-    case 'note': return `note${clock}: ${rest.text}`;
-    case 'marker': return `marker${clock}: ${rest.name}`;
-    case 'language': return `language: ${rest.language}`;
-    case 'held': return rest.held ? 'held before the next item' : 'goes on';
-    case 'begun': return 'session begun';
-    case 'allocated': return `group ${rest.group}, place ${Number(rest.place) + 1} in it`;
-    case 'ended': return `session ended: ${rest.reason}`;
-    case 'started': return `started${of}, attempt ${rest.attempt}${run ? `, ${run}` : ''}`;
-    case 'practised': return `practised${of}: ${rest.good ? 'good' : 'not good'}`;
+    case 'note': return `${what}${clock}: ${rest.text}`;
+    case 'marker': return `${what}${clock}: ${rest.name}`;
+    case 'language': return `${what}: ${rest.language}`;
+    case 'held': return words.of(rest.held ? 'log_held' : 'log_released');
+    case 'allocated': return words.of('log_allocated', {
+      group: `${rest.group}`, place: Number(rest.place) + 1 });
+    case 'started': return [what, words.of('desk_attempt', { attempt: Number(rest.attempt) }),
+      ...run ? [`${run}`] : []].join(', ');
+    case 'practised':
+      return `${what}: ${words.of(rest.good ? 'log_practised_good' : 'log_practised_bad')}`;
     default: {
-      const why = rest.reason ?? rest.outcome;
-      return `${kind}${of}${why === undefined ? '' : `: ${why}`}`;
+      const why = rest.reason ?? (rest.outcome ? words.of(`outcome_${rest.outcome}`) : undefined);
+      return `${what}${why === undefined ? '' : `: ${why}`}`;
     }
   }
 }

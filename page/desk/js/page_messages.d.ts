@@ -45,7 +45,7 @@ export interface Hold {
   held: boolean;
 }
 
-/** The participant's language. */
+/** The language of the participant, or of the experimenter's page. */
 export interface Language {
   type: 'language';
   language: string;
@@ -90,4 +90,4 @@ export interface Reasoned {
 
 export type ParticipantMessage = Hello | Here | Language | Ready | Finish | Ping;
 
-export type ExperimenterMessage = Note | Mark | Reasoned | End | Hold | Ping;
+export type ExperimenterMessage = Note | Mark | Reasoned | End | Hold | Language | Ping;

@@ -58,7 +58,7 @@ class ParticipantPage {
   #receive(message: Received) {
     switch (message.type) {
       case 'words':
-        this.#words.load(message.words);
+        this.#words.load(message.words, message.language);
         // Redraw the present content in the new words.
         if (this.#shown !== null) {
           this.#show(this.#shown, true);

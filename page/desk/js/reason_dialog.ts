@@ -4,6 +4,8 @@
 
 import { element } from '../../cockpit/js/dom.js';
 
+import type { Words } from './words.js';
+
 /**
  * Show the dialog and return the reason.
  *
@@ -11,7 +13,7 @@ import { element } from '../../cockpit/js/dom.js';
  * @param reasoned whether a reason is asked for
  * @returns the reason, empty where none is asked for; null for no
  */
-export function askReason(title: string, text: string, yes: string,
+export function askReason(words: Words, title: string, text: string, yes: string,
   reasoned = true): Promise<string | null> {
   return new Promise((resolve) => {
     const reason = element('input', { id: 'reason', type: 'text', required: true,
@@ -30,10 +32,11 @@ export function askReason(title: string, text: string, yes: string,
       }
     } } },
     element('h2', { id: 'asking-title', text: title }), element('p', { text }),
-    reasoned ? element('label', { for: 'reason', text: 'Reason' }) : null,
+    reasoned ? element('label', { for: 'reason', text: words.of('desk_reason') }) : null,
     reasoned ? reason : null,
     element('div', { class: 'go-on' },
-      element('button', { type: 'button', text: 'Cancel', on: { click: () => dialog.close() } }),
+      element('button', { type: 'button', text: words.of('desk_cancel'),
+        on: { click: () => dialog.close() } }),
       element('button', { type: 'submit', class: 'primary', text: yes }))));
     document.body.append(dialog);
     dialog.showModal();
