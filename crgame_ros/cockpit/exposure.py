@@ -124,7 +124,7 @@ class Exposure:
 
         :raises CrgameError: if a certificate cannot be created or used.
         """
-        pair = self._certificate()
+        pair = self.pair()
         tls = None if pair is None else tls_context(*pair)
         if self.links and self.private is not None:
             return Access(self.host, self.port, tls=tls,
@@ -152,14 +152,23 @@ class Exposure:
                 lines.append(f'  {words:<14} {access.link(links.make(role, seat))}')
         elif links is not None:
             lines.append('the links are those that were printed before')
-        pair = self._certificate()
-        if pair is not None:
-            made = '' if self.certificate is not None \
-                else ', made for this run: browsers warn of it, compare before going on'
-            lines.append(f'its certificate (SHA-256{made}): {fingerprint(pair[0])}')
-        return lines
+        return [*lines, *self.certificate_lines()]
 
-    def _certificate(self) -> tuple[Path, Path] | None:
+    def certificate_lines(self) -> list[str]:
+        """Return a line with the certificate's fingerprint; none without TLS."""
+        pair = self.pair()
+        if pair is None:
+            return []
+        made = '' if self.certificate is not None \
+            else ', made for this run: browsers warn of it, compare before going on'
+        return [f'its certificate (SHA-256{made}): {fingerprint(pair[0])}']
+
+    def pair(self) -> tuple[Path, Path] | None:
+        """
+        Return the files of the certificate and of its key; None for plain HTTP.
+
+        :raises CrgameError: if none is given and none can be created.
+        """
         if self.certificate is not None and self.key is not None:
             return self.certificate, self.key
         if not self.links or self.private is None:

@@ -15,8 +15,8 @@ from crgame_ros.errors import CrgameError, InputError
 
 TOKEN_BYTES = 24
 MAX_LINKS = 200
-USED = 'This link has been used: it lets one browser in. Ask a director for another one.'
-UNKNOWN = 'Open a link that the cockpit printed when it started, or that a director gave you.'
+USED = 'This link has been used: it lets one browser in. Ask whoever gave it to you for another.'
+UNKNOWN = 'Open a link that was printed at the start, or that somebody gave you.'
 
 
 @dataclass

@@ -3,6 +3,7 @@
 """The checks of every request before it is answered, and the headers of answers."""
 
 from collections.abc import Awaitable, Callable
+from html import escape
 
 from aiohttp import hdrs, web
 from aiohttp.typedefs import Handler, Middleware
@@ -141,6 +142,9 @@ async def _answer(access: Access, request: web.Request,
     refusal = _refusal(access, request, sockname[1])
     if refusal:
         return web.Response(status=403, text=f'{refusal}\n')
+    if access.asks and 'token' in request.query \
+            and request.headers.get('Sec-Fetch-Site') == 'cross-site':
+        return _begun_here(request)
     name = cookie_name(sockname[1], access.tls is not None)
     cookie = request.cookies.get(name)
     if access.asks and request.path == '/' and 'token' in request.query:
@@ -160,6 +164,18 @@ async def _answer(access: Access, request: web.Request,
         return web.Response(status=403, text=f'{access.refusal}\n')
     request[RIGHTS] = rights
     return await handler(request)
+
+
+def _begun_here(request: web.Request) -> web.Response:
+    """
+    Return a page that opens its own address again.
+
+    Browsers send no strict cookie with a navigation that a page of another site began, such as a
+    click on a link in a mail.
+    """
+    return web.Response(content_type='text/html', text=(
+        '<!DOCTYPE html><meta http-equiv="refresh" '
+        f'content="0; url={escape(str(request.rel_url))}">\n'))
 
 
 def _refusal(access: Access, request: web.Request, port: int) -> str:

@@ -89,7 +89,7 @@ async def test_a_link_lets_one_browser_in_over_tls(tmp_path: Path) -> None:
         async with other.get(links['to drive hv0'], ssl=other.trusted) as answer:
             assert answer.status == 403
             assert await answer.text() == ('This link has been used: it lets one browser in. '
-                                           'Ask a director for another one.\n')
+                                           'Ask whoever gave it to you for another.\n')
         async with other.get(access.url, ssl=other.trusted) as answer:
             assert answer.status == 403 and 'Open a link' in await answer.text()
 

@@ -12,6 +12,7 @@ import time
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, run_folder
+from crgame_ros.study.conduct.cockpit_links import make_links
 from crgame_ros.study.conduct.director import Director
 from crgame_ros.study.conduct.study_drive import (
     clean_s,
@@ -57,12 +58,16 @@ class LiveDrives:
     :param language: returns that of the participant.
     :param port: of the cockpit.
     :param more: returns further arguments of the launcher.
+    :param certificate: of the cockpit, if it is opened to other machines by links.
     """
 
     def __init__(self, session: ParticipantSession, folder: Path, language: Callable[[], str],
-                 port: int, more: Callable[[], Sequence[str]] = tuple) -> None:
+                 port: int, more: Callable[[], Sequence[str]] = tuple,
+                 certificate: Path | None = None) -> None:
         self._session, self._folder, self._language = session, folder, language
-        self._port, self._more = port, more
+        self._port, self._more, self._certificate = port, more, certificate
+        # To drive and to watch, of the present graph.
+        self._links: tuple[str, str] | None = None
         self._key = secrets.token_hex(16)
         self._graph: StudyGraph | None = None
         self._director: Director | None = None
@@ -195,8 +200,11 @@ class LiveDrives:
                          default=0)
         graph = self._graph = StudyGraph(drive.game, runs / str(number), self._port, self._more())
         director = self._director = Director(graph.domain_id)
-        await self._until(lambda: bool(graph.cockpit) and director.game is not None, LOADS_S,
-                          'the simulation does not start')
+        opened = self._certificate is not None
+        await self._until(lambda: bool(graph.director if opened else graph.cockpit)
+                          and director.game is not None, LOADS_S, 'the simulation does not start')
+        self._links = None if self._certificate is None \
+            else await make_links(graph.director, self._certificate)
         return director
 
     async def _drive(self, drive: StudyDrive) -> None:
@@ -345,8 +353,9 @@ class LiveDrives:
                    drive: StudyDrive | None = None) -> None:
         link = watch = ''
         if drive is not None and self._graph is not None:
-            link = drive.link(self._graph.cockpit, self._language(), self._key)
-            watch = drive.watch_link(self._graph.cockpit)
+            page, watched = self._links or (self._graph.cockpit, self._graph.cockpit)
+            link = drive.link(page, self._language(), self._key)
+            watch = drive.watch_link(watched)
         state = DriveState(phase, item, attempt, link, watch, None, work, text)
         if state != self._state:
             self._state = state

@@ -6,11 +6,12 @@ import asyncio
 from collections.abc import Callable
 import contextlib
 from dataclasses import dataclass
+import math
 from pathlib import Path
 import signal
 from urllib.parse import urlsplit
 
-from crgame_ros.cockpit.access import Access
+from crgame_ros.cockpit.exposure import Exposure
 from crgame_ros.software import software_with_commit
 from crgame_ros.study.conduct.live_drives import LiveDrives
 from crgame_ros.study.desk.desk import Desk
@@ -36,6 +37,11 @@ class SessionRequest:
     :param port: of the pages; the cockpit takes a later one.
     :param place: among all participants, from 0 on; by default the next free one.
     :param group: that the experimenter gives.
+    :param listen: address at which other machines get the pages, by links over TLS; None serves
+        this machine alone.
+    :param certificate: PEM file; None makes one.
+    :param key: of the certificate.
+    :param absent_s: ends the program if no page of the participant is heard for so long [s]
     """
 
     study: StudyFile
@@ -44,6 +50,19 @@ class SessionRequest:
     port: int
     place: int | None = None
     group: str | None = None
+    listen: str | None = None
+    certificate: Path | None = None
+    key: Path | None = None
+    absent_s: float = math.inf
+
+    def exposure(self, private: Path) -> Exposure:
+        """
+        Return how the pages are served.
+
+        :param private: folder of links and certificate.
+        """
+        return Exposure(self.listen or HOST, self.port, links=self.listen is not None,
+                        certificate=self.certificate, key=self.key, private=private)
 
 
 def conduct(request: SessionRequest, say: Callable[[str], None]) -> bool:
@@ -73,20 +92,27 @@ async def _conduct(session: ParticipantSession, request: SessionRequest,
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         loop.add_signal_handler(number, stop.set)
     origin: list[str] = []
-    drives = LiveDrives(session, request.folder, lambda: desk.language, request.port + 1,
-                        lambda: ['--countdown', str(COUNTDOWN_S), '--framed-by', *origin])
-    desk = Desk(session, drives)
     private = request.folder / '.private'
     private.mkdir(parents=True, exist_ok=True, mode=0o700)
-    runner, lines = await serve_desk(desk, Access(HOST, request.port), private)
+    exposure = request.exposure(private)
+    pair = exposure.pair()
+    opened = [] if pair is None else [
+        '--open-cockpit', '--listen', exposure.host, '--certificate', str(pair[0]),
+        '--key', str(pair[1])]
+    drives = LiveDrives(session, request.folder, lambda: desk.language, request.port + 1,
+                        lambda: ['--countdown', str(COUNTDOWN_S), *opened, '--framed-by', *origin],
+                        None if pair is None else pair[0])
+    desk = Desk(session, drives)
+    runner, lines = await serve_desk(desk, exposure.access(), private)
     driving: asyncio.Task[None] | None = None
     try:
-        for line in lines:
+        for line in (*lines, *exposure.certificate_lines()):
             say(line)
         address = urlsplit(lines[0].split()[-1])
         origin.append(f'{address.scheme}://{address.netloc}')
         driving = asyncio.create_task(drives.run())
-        await _until_over(session, driving, stop)
+        if not await _until_over(desk, driving, stop, request.absent_s):
+            say(f'no page of {request.participant} for {request.absent_s / 60.0:g} min')
     finally:
         if driving is not None:
             driving.cancel()
@@ -97,17 +123,25 @@ async def _conduct(session: ParticipantSession, request: SessionRequest,
         await runner.cleanup()
 
 
-async def _until_over(session: ParticipantSession, driving: asyncio.Task[None],
-                      stop: asyncio.Event) -> None:
-    """Wait for the last item, or for the end of the program."""
+async def _until_over(desk: Desk, driving: asyncio.Task[None], stop: asyncio.Event,
+                      absent_s: float) -> bool:
+    """
+    Wait for the last item, or for the end of the program.
+
+    :param absent_s: do not wait any longer for a participant whose page is silent [s].
+    :return: whether the participant was there.
+    """
     stopped = asyncio.create_task(stop.wait())
     try:
-        while not stop.is_set() and session.next_item is not None:
+        while not stop.is_set() and desk.session.next_item is not None:
+            if desk.clock_s() - desk.heard_s > absent_s:
+                return False
             if driving.done() and driving.exception() is not None:
                 # An error that no page can fix.
                 driving.result()
             await asyncio.sleep(0.1)
         if not stop.is_set():
             await asyncio.wait([stopped], timeout=LINGER_S)
+        return True
     finally:
         stopped.cancel()

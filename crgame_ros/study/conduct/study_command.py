@@ -4,6 +4,7 @@
 
 import argparse
 from functools import partial
+import math
 from pathlib import Path
 import sys
 
@@ -20,6 +21,7 @@ Plan an experiment with people: who drives which trials in which order, and what
   crgame study power my_study/study.yaml         # of the planned tests, by simulation
   crgame study preregister my_study/study.yaml   # the plan as one document with a hash
   crgame study run my_study/study.yaml --participant P01
+  crgame study run my_study/study.yaml --participant P02 --listen sim.example.org   # elsewhere
   crgame study data studies/my_study      # tables of what it has found so far
   crgame study report studies/my_study    # the same for people, one HTML file
   crgame study rerun studies/my_study --planner constant-velocity   # the same people again
@@ -46,8 +48,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                      help='place in the orders, from 1 on (default: the next free one)')
     run.add_argument('--group', metavar='NAME', help='of a new participant, in a study whose '
                      'groups the experimenter gives')
-    run.add_argument('--port', type=int, default=8090, metavar='P',
-                     help='port of the pages (default: 8090, or the next free one)')
+    run.add_argument('--absent', type=float, default=math.inf, metavar='MIN',
+                     help="end if the participant's page is gone for so many minutes; the same "
+                     'command continues (default: wait)')
+    _add_opening(run, 'port of the pages (default: 8090, or the next free one); the view of the '
+                 'drives takes the next one')
     run.set_defaults(command=run_command)
     check = what.add_parser('check', help='find mistakes, and print the plan')
     check.add_argument('file', type=Path, help='study file')
@@ -58,6 +63,44 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     check.set_defaults(command=check_command)
     add_plan_arguments(what)
     add_data_arguments(what)
+
+
+def _add_opening(command: argparse.ArgumentParser, port: str) -> None:
+    """
+    Add the options of the pages' addresses, as `crgame run` has them.
+
+    :param port: help of `--port`.
+    """
+    command.add_argument('--port', type=int, default=8090, metavar='P', help=port)
+    command.add_argument('--listen', metavar='ADDRESS', help='serve the pages to other machines '
+                         'too, over TLS; each printed link lets one browser in. ADDRESS is a name '
+                         'or address of this machine, as the participants reach it')
+    command.add_argument('--certificate', type=Path, metavar='FILE', help='PEM file for TLS, with '
+                         '--key (default: one is made by openssl, and browsers warn of it)')
+    command.add_argument('--key', type=Path, metavar='FILE',
+                         help='PEM file with the key of the certificate')
+
+
+def _check_opening(values: argparse.Namespace) -> None:
+    """
+    Check these options before anything is begun.
+
+    :raises InputError: if one cannot be used.
+    """
+    from crgame_ros.cockpit.access import check_address
+    from crgame_ros.cockpit.exposure import check_certificate
+    if not 1 <= values.port <= 65_000:
+        raise InputError(f'is {values.port}', '--port', 'give 1 to 65000')
+    if (values.certificate is None) != (values.key is None):
+        raise InputError('a certificate and its key belong together', '--certificate',
+                         'give --certificate and --key')
+    if values.listen is None:
+        if values.certificate is not None:
+            raise InputError('is of no use on this machine alone', '--certificate',
+                             'give --listen too')
+        return
+    check_certificate(values.certificate, values.key)
+    check_address(values.listen, values.port)
 
 
 def new_command(values: argparse.Namespace) -> int:
@@ -135,8 +178,9 @@ def run_command(values: argparse.Namespace) -> int:
     from crgame_ros.study.conduct.session_run import conduct, SessionRequest
     study = load_study(values.file)
     participant = check_participant(values.participant)
-    if not 1 <= values.port <= 65_000:
-        raise InputError(f'is {values.port}', '--port', 'give 1 to 65000')
+    _check_opening(values)
+    if not values.absent > 0.0:
+        raise InputError(f'is {values.absent:g}', '--absent', 'give minutes above 0')
     if values.place is not None and not 1 <= values.place <= 10_000:
         raise InputError(f'is {values.place}', '--place', 'give 1 to 10000')
     if values.place is not None and study.groups is not None:
@@ -147,7 +191,8 @@ def run_command(values: argparse.Namespace) -> int:
     folder.keep_study(study, values.file, pictures_of(study))
     over = conduct(SessionRequest(
         study, folder.participant(participant).resolve(), participant, values.port,
-        None if values.place is None else values.place - 1, values.group), print_now)
+        None if values.place is None else values.place - 1, values.group, values.listen,
+        values.certificate, values.key, 60.0 * values.absent), print_now)
     print_now(f'{participant} is done' if over
               else f'{participant} goes on with the same command')
     return 0

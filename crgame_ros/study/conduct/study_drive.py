@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive of a study: its game, its outcome and its disturbances."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import json
 from pathlib import Path
@@ -143,14 +143,20 @@ class StudyDrive:
                  for name in ('map', 'names', 'plans', 'sound')}
         labels = {name: settings.label_of(name, language) for name in settings.labels or {}}
         told = {'labels': json.dumps(labels, ensure_ascii=False)} if labels else {}
-        return f'{cockpit.rstrip("/")}/?' + urlencode(
-            {'stage': self.seat, 'view': settings.view or 'driver', **shown,
-             **({} if settings.photodiode is None else {'corner': settings.photodiode}),
-             'lang': language, **told, 'key': key})
+        return _with_query(cockpit, {
+            'stage': self.seat, 'view': settings.view or 'driver', **shown,
+            **({} if settings.photodiode is None else {'corner': settings.photodiode}),
+            'lang': language, **told, 'key': key})
 
     def watch_link(self, cockpit: str) -> str:
         """Return the address of a page that only shows the drive."""
-        return f'{cockpit.rstrip("/")}/?' + urlencode({'view': 'chase', 'vehicle': self.seat})
+        return _with_query(cockpit, {'view': 'chase', 'vehicle': self.seat})
+
+
+def _with_query(address: str, values: Mapping[str, object]) -> str:
+    """Return a page's address with further values; it may have a token already."""
+    page, _, query = address.partition('?')
+    return f'{page.rstrip("/")}/?{query}{"&" if query else ""}{urlencode(values)}'
 
 
 def write_drive(item: SessionItem, games: Path) -> StudyDrive | None:

@@ -12,7 +12,7 @@ import time
 
 from crgame_ros.ros.environment import free_domain_id
 
-_AT = 'the cockpit is at '
+_AT, _DIRECT = 'the cockpit is at ', '  to direct '
 # Time limit for finishing recordings [s].
 _END_S = 90.0
 
@@ -26,6 +26,8 @@ class StudyGraph:
     :param port: of its cockpit; the next free one if it is in use.
     :param more: further arguments of the launcher.
     :ivar domain_id: its `ROS_DOMAIN_ID`.
+    :ivar cockpit: address of its cockpit; empty before it is known.
+    :ivar director: link to direct it, if it is opened to other machines; else empty.
     """
 
     def __init__(self, game: Path, folder: Path, port: int, more: Sequence[str] = ()) -> None:
@@ -34,8 +36,10 @@ class StudyGraph:
         self._log = folder.with_suffix('.log')
         self._read = 0
         self._rest = b''
-        self.cockpit = ''
+        self.cockpit = self.director = ''
         folder.parent.mkdir(parents=True, exist_ok=True)
+        # It has links.
+        self._log.touch(mode=0o600)
         with self._log.open('wb') as log:
             self._process = subprocess.Popen(
                 [sys.executable, '-m', 'crgame_ros.study.conduct.watched_launcher',
@@ -65,13 +69,15 @@ class StudyGraph:
         """Read the launcher's new output, which contains the cockpit's address."""
         with self._log.open('rb') as log:
             log.seek(self._read)
-            text = self._rest + log.read()
+            content = self._rest + log.read()
             self._read = log.tell()
-        *lines, self._rest = text.split(b'\n')
+        *lines, self._rest = content.split(b'\n')
         for line in lines:
-            _, found, address = line.decode('utf-8', 'replace').partition(_AT)
-            if found:
-                self.cockpit = address.strip()
+            text = line.decode('utf-8', 'replace')
+            if _AT in text:
+                self.cockpit = text.partition(_AT)[2].strip()
+            elif _DIRECT in text:
+                self.director = text.partition(_DIRECT)[2].strip()
 
     def last_words(self) -> str:
         """Return its last line about an error, or else its last line."""

@@ -64,6 +64,8 @@ class Desk:
         self.session, self.drives, self.clock_s = session, drives, clock_s
         # The reason for ending the session after its present drive; empty otherwise.
         self.ending = ''
+        # When a page of the participant was heard last; at first now [s since 1970].
+        self.heard_s = clock_s()
         self._watchers: list[Callable[[], None]] = []
         drives.watch(self._drive_changed)
         self._begin_break()

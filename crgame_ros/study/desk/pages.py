@@ -99,8 +99,6 @@ class DeskPages:
         self._used: Client | None = None
         self._used_page = ''
         self._told: dict[str, object] = {}
-        # When the used page was heard last [s since 1970].
-        self._heard_s = 0.0
         self._is_due = False
         desk.watch(self._changed)
 
@@ -138,13 +136,13 @@ class DeskPages:
                                     'open': len(self._participants)}
         if not self._is_silent:
             return {**state, **self._told}
-        told = {'silent_s': round(self.desk.clock_s() - self._heard_s)}
+        told = {'silent_s': round(self.desk.clock_s() - self.desk.heard_s)}
         return {**state, **told, **{name: value for name, value in self._told.items()
                                     if name == 'error'}}
 
     @property
     def _is_silent(self) -> bool:
-        return self._used is not None and self.desk.clock_s() - self._heard_s > SILENT_S
+        return self._used is not None and self.desk.clock_s() - self.desk.heard_s > SILENT_S
 
     def update_experimenters(self) -> None:
         """Send the present document to the experimenter's pages."""
@@ -172,13 +170,13 @@ class DeskPages:
             if isinstance(message, Here) or message.fresh or page == self._used_page \
                     or not self._used:
                 self._used, self._used_page, self._told = client, page, {}
-                self._heard_s = self.desk.clock_s()
+                self.desk.heard_s = self.desk.clock_s()
             self._changed()
             return
         if isinstance(message, Ping):
             if client is self._used:
                 self._is_due = self._is_due or self._is_silent
-                self._heard_s = self.desk.clock_s()
+                self.desk.heard_s = self.desk.clock_s()
                 self._hear(message.model_dump(exclude={'type', 't'}, exclude_none=True))
             self._answer(client, message)
             return

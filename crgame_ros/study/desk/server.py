@@ -143,6 +143,8 @@ def _end_with(writer: asyncio.Task[None], client: Client) -> None:
 SHARED = ('cockpit', 'desk')
 PAGES = {'/': 'desk/participant.html', '/experimenter': 'desk/experimenter.html'}
 LINKS = 'desk_links.json'
+# Begins the line with the participant's address.
+PARTICIPANT = 'participant'
 MAX_PAGES = 12
 _STALL_CHECK_S = 0.5
 _ONLY_EXPERIMENTER = "This page is the experimenter's: its address stands on the terminal."
@@ -210,10 +212,14 @@ async def serve_desk(desk: Desk, access: Access, private: Path
     runner, port = await listen(create_desk_app(desk, access, experimenters), access.host,
                                 access.port)
     here = access.at_port(port)
-    first, *others = here.urls
     own = here.link(experimenters.make('direct')).replace('/?', '/experimenter?')
-    return runner, [f'participant: {first}', *(f'  also: {other}' for other in others),
-                    f'experimenter, in one browser alone: {own}']
+    if access.invitations is None:
+        first, *others = here.urls
+        lines = [f'{PARTICIPANT}: {first}', *(f'  also: {other}' for other in others)]
+    else:
+        link = here.link(access.invitations.make('drive'))
+        lines = [f'{PARTICIPANT}, in one browser alone: {link}']
+    return runner, [*lines, f'experimenter, in one browser alone: {own}']
 
 
 def _add_pages(app: web.Application, desk: Desk, access: Access,
