@@ -10,6 +10,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Folder, Keyed, Listed, Within, Wording
 from crgame_ros.schema.reading import read
+from crgame_ros.study.elsewhere import Elsewhere
 from crgame_ros.study.groups import Groups
 from crgame_ros.study.local_text import LocalText, Text
 from crgame_ros.study.names import Name
@@ -181,6 +182,7 @@ class StudyFile:
     :param fields: questions to each participant at the start.
     :param exclude: rules that end a session.
     :param groups: a factor between participants.
+    :param elsewhere: participants whom a recruiting platform sends.
     :param markers: that the experimenter can set by a key during a session.
     :param retention: until when the participants' data may be kept.
     :param quality: the bounds of data that hold, and what happens beyond them.
@@ -207,6 +209,7 @@ class StudyFile:
     fields: Annotated[tuple[Question, ...], Listed(0, 50, 'question', 'name')] = ()
     exclude: Annotated[tuple[Exclusion, ...], Listed(0, 50, 'rule')] = ()
     groups: Groups | None = None
+    elsewhere: Elsewhere | None = None
     markers: Annotated[tuple[str, ...], Listed(0, 9, 'marker')] = ('marker',)
     retention: Retention | None = None
     quality: QualityBounds = QualityBounds()

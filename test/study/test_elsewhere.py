@@ -21,10 +21,17 @@ from aiohttp import (
     Fingerprint,
     WSServerHandshakeError,
 )
-from crgame_ros.cockpit.access import reachable_addresses
+from crgame_ros.cockpit.access import Access, reachable_addresses
+from crgame_ros.cockpit.server import listen
+from crgame_ros.errors import InputError
+from crgame_ros.schema.reading import read
 from crgame_ros.study.conduct.session_run import SessionRequest
 from crgame_ros.study.desk.desk import Desk
+from crgame_ros.study.desk.pages import words_of
+from crgame_ros.study.desk.participant_document import participant_document
+from crgame_ros.study.desk.reception import create_reception_app, Reception
 from crgame_ros.study.desk.server import serve_desk
+from crgame_ros.study.elsewhere import Elsewhere, PlatformIds
 from crgame_ros.study.participant_session import ParticipantSession
 import pytest
 
@@ -170,3 +177,128 @@ async def test_a_session_goes_on_after_a_lost_connection_and_another_start(tmp_p
         await do_until(again, socket, '')
         await shown(socket, shows('over'))
         await socket.close()
+
+
+PLATFORM = {'id_from': 'PROLIFIC_PID', 'completion_code': 'C1A2B3', 'screen_out_code': 'S9',
+            'completed_address': 'https://app.example.org/submissions/complete?cc={code}'}
+# Ids of a platform that are none.
+HOSTILE = ('', ' ', 'a b', 'a/b', '../../etc', 'a' * 65, 'me@example.org', '"><script>', 'a\nb',
+           '\u0661', 'a\x00', '{code}', '=1+1')
+
+
+def test_ids_of_a_platform_become_ids_of_the_study(tmp_path: Path) -> None:
+    ids = PlatformIds.begun(tmp_path / 'a')
+    own = ids.own_id('5f0c1234abcd')
+    assert re.fullmatch('E[0-9a-f]{12}', own)
+    # It is always the same, also after another start, and that of another is another.
+    assert PlatformIds.begun(tmp_path / 'a').own_id('5f0c1234abcd') == own
+    assert PlatformIds(tmp_path / 'a').token == ids.token
+    assert len({ids.own_id(f'{number:x}') for number in range(2000)}) == 2000
+    # Without the secret of the study, nobody can tell whose it is.
+    other = PlatformIds.begun(tmp_path / 'b')
+    assert other.own_id('5f0c1234abcd') != own and other.token != ids.token
+    key = tmp_path / 'a' / '.private' / 'platform.key'
+    assert key.parent.stat().st_mode & 0o077 == 0
+    assert b'5f0c1234abcd' not in key.read_bytes() and len(ids.token) == 32
+    for given in (*HOSTILE, '\ud800'):
+        with pytest.raises(InputError, match='is no id of a platform'):
+            ids.own_id(given)
+    key.write_bytes(b'short')
+    with pytest.raises(InputError, match='is no key'):
+        PlatformIds.begun(tmp_path / 'a')
+    with pytest.raises(InputError, match='has received nobody yet'):
+        PlatformIds(tmp_path / 'c')
+
+
+@pytest.mark.parametrize(('key', 'value'), [
+    ('id_from', 'token'), ('id_from', 'a b'), ('id_from', ''), ('completion_code', 'a"b'),
+    ('completion_code', ''), ('completed_address', 'http://example.org/'),
+    ('completed_address', 'javascript:alert(1)'), ('completed_address', 'https://a b/'),
+    ('completed_address', 'https://user@example.org/')])
+def test_a_platform_is_refused_that_cannot_be_one(key: str, value: str) -> None:
+    with pytest.raises(InputError, match=key):
+        read(Elsewhere, PLATFORM | {key: value}, 'elsewhere')
+
+
+@pytest.mark.parametrize(('age', 'how', 'code'), [(30, 'done', 'C1A2B3'), (19, 'excluded', 'S9')])
+def test_the_last_page_has_the_code_of_how_it_ended(tmp_path: Path, age: int, how: str,
+                                                    code: str) -> None:
+    study = write_study(
+        tmp_path / 'study', languages=[], before=[], after=[], elsewhere=PLATFORM,
+        fields=[{'name': 'age', 'number': {'low': 18, 'high': 99}}],
+        exclude=[{'when': {'field': 'age', 'below': 20}}])
+    with ParticipantSession(study, tmp_path / 'P07', 'P07', 0) as session:
+        desk = Desk(session, DrivesWithoutGraph(session))
+        desk.finish('fields', {'age': age})
+        while session.next_item is not None:
+            session.skip('not needed here')
+        told = participant_document(desk)
+        assert (told['how'], told['code'], told['address']) == (
+            how, code, f'https://app.example.org/submissions/complete?cc={code}')
+
+
+def test_without_a_platform_there_is_no_code(tmp_path: Path) -> None:
+    study = write_study(tmp_path / 'study', languages=[])
+    with ParticipantSession(study, tmp_path / 'P07', 'P07', 0) as session:
+        session.end('tired')
+        told = participant_document(Desk(session, DrivesWithoutGraph(session)))
+        assert (told['how'], told['code'], told['address']) == ('ended', '', '')
+
+
+@in_loop
+async def test_those_who_arrive_are_led_to_their_sessions_or_told_why_not(tmp_path: Path) -> None:
+    study = write_study(tmp_path / 'study', elsewhere=PLATFORM)
+    ids = PlatformIds.begun(tmp_path)
+    arrived: list[str] = []
+    result = Reception('https://192.0.2.7:8091/?token=x')
+
+    async def receive(participant: str) -> Reception:
+        arrived.append(participant)
+        return result
+
+    access = Access('127.0.0.1', 0, ids.token)
+    runner, port = await listen(create_reception_app(study, access, ids, receive), '127.0.0.1', 0)
+    address = access.at_port(port).url
+    try:
+        async with ClientSession(cookie_jar=CookieJar(unsafe=True)) as http:
+            async def arrive(*given: str, language: str = 'de-AT,en;q=0.5') -> tuple[int, str]:
+                query = [('PROLIFIC_PID', each) for each in given]
+                async with http.get(root, params=[*query, ('STUDY_ID', '1')],
+                                    headers={'Accept-Language': language},
+                                    allow_redirects=False) as answer:
+                    return answer.status, answer.headers.get('Location', await answer.text())
+
+            root = address.partition('?')[0]
+            # Whoever does not have the platform's address gets nothing.
+            assert (await arrive('p1'))[0] == 403
+            async with http.get(f'{root}?token=guessed&PROLIFIC_PID=p1') as answer:
+                assert answer.status == 403
+            assert not arrived
+            async with http.get(f'{address}&PROLIFIC_PID=p1', allow_redirects=False) as answer:
+                assert (answer.status, answer.headers['Location']) == (303, '/?PROLIFIC_PID=p1')
+            assert await arrive('p1') == (303, 'https://192.0.2.7:8091/?token=x')
+            assert await arrive('p1') == await arrive('p1') and arrived == 3 * [ids.own_id('p1')]
+            for given in HOSTILE:
+                status, text = await arrive(given)
+                assert status == 400 and 'Dieser Link sagt nicht' in text, given
+                assert '<script' not in text
+            assert (await arrive())[0] == (await arrive('p1', 'p2'))[0] == 400
+            assert len(arrived) == 3
+            for language in ('en', 'de', 'fr', '', '<script>', ';;,,' * 99):
+                result = Reception(why='full')
+                status, text = await arrive('p2', language=language)
+                words = words_of(study, language if language == 'de' else 'en')
+                assert status == 503 and words['arrive_full'] in text and 'refresh' in text
+            result = Reception(why='done')
+            status, text = await arrive('p1')
+            assert status == 200 and 'Code: C1A2B3' in text
+            assert 'href="https://app.example.org/submissions/complete?cc=C1A2B3"' in text
+            result = Reception(why='declined')
+            assert 'Code' not in (await arrive('p1'))[1]
+            async with http.get(f'{root}static/desk/desk.css') as answer:
+                assert answer.status == 200
+            for path in ('experimenter', 'static/desk/experimenter.html', 'ws/participant'):
+                async with http.get(root + path) as answer:
+                    assert answer.status == 404, path
+    finally:
+        await asyncio.wait_for(runner.cleanup(), PATIENCE_S)

@@ -3,8 +3,10 @@
 """The command `crgame study`: experiments with people."""
 
 import argparse
+import asyncio
 from functools import partial
 import math
+import os
 from pathlib import Path
 import sys
 
@@ -22,6 +24,7 @@ Plan an experiment with people: who drives which trials in which order, and what
   crgame study preregister my_study/study.yaml   # the plan as one document with a hash
   crgame study run my_study/study.yaml --participant P01
   crgame study run my_study/study.yaml --participant P02 --listen sim.example.org   # elsewhere
+  crgame study serve my_study/study.yaml --listen sim.example.org   # whom a platform sends
   crgame study data studies/my_study      # tables of what it has found so far
   crgame study report studies/my_study    # the same for people, one HTML file
   crgame study rerun studies/my_study --planner constant-velocity   # the same people again
@@ -54,6 +57,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_opening(run, 'port of the pages (default: 8090, or the next free one); the view of the '
                  'drives takes the next one')
     run.set_defaults(command=run_command)
+    serve = what.add_parser('serve', help='receive participants whom a platform sends, several '
+                            'at once')
+    serve.add_argument('file', type=Path, help='study file, with "elsewhere"')
+    serve.add_argument('--out', type=Path, metavar='DIR',
+                       help="folder of the study's data (default: studies/NAME)")
+    serve.add_argument('--capacity', type=int, default=1, metavar='N',
+                       help='sessions at once (default: 1); others are asked to wait')
+    serve.add_argument('--id-of', metavar='ID', help="print the participant's id in the study "
+                       "that belongs to a platform's, and end")
+    _add_opening(serve, 'port of the reception (default: 8090); each session takes the next two')
+    serve.set_defaults(command=serve_command)
     check = what.add_parser('check', help='find mistakes, and print the plan')
     check.add_argument('file', type=Path, help='study file')
     check.add_argument('--participants', type=int, metavar='N',
@@ -175,6 +189,10 @@ def run_command(values: argparse.Namespace) -> int:
     require_ros()
     prepare_environment()
     from crgame_ros.launcher.interruption import print_now
+    from crgame_ros.ros.node_main import end_with_parent, PARENT_VARIABLE
+    # A session of a reception ends with it; the processes of the session have another parent.
+    end_with_parent()
+    os.environ.pop(PARENT_VARIABLE, None)
     from crgame_ros.study.conduct.session_run import conduct, SessionRequest
     study = load_study(values.file)
     participant = check_participant(values.participant)
@@ -195,4 +213,44 @@ def run_command(values: argparse.Namespace) -> int:
         values.certificate, values.key, 60.0 * values.absent), print_now)
     print_now(f'{participant} is done' if over
               else f'{participant} goes on with the same command')
+    return 0
+
+
+def serve_command(values: argparse.Namespace) -> int:
+    """
+    Receive participants whom a platform sends, until the program is ended.
+
+    :raises CrgameError: if the study has no platform, cannot be run, or no address can be used.
+    """
+    from crgame_ros.study.elsewhere import PlatformIds
+    from crgame_ros.study.file import load_study
+    from crgame_ros.study.folder import StudyFolder
+    study = load_study(values.file)
+    if study.elsewhere is None:
+        raise InputError('sends its participants from no platform', str(values.file),
+                         'give "elsewhere" with "id_from", or take crgame study run')
+    folder = StudyFolder(values.out or Path('studies') / study.name)
+    if values.id_of is not None:
+        print(PlatformIds(folder.root).own_id(values.id_of))
+        return 0
+    if study.groups is not None and study.groups.allocation == 'given':
+        raise InputError('has groups that you give to each participant', str(values.file),
+                         'let chance or a field decide, or take crgame study run')
+    if values.listen is None:
+        raise InputError('is missing', '--listen', 'name the address that participants reach')
+    if not 1 <= values.capacity <= 100:
+        raise InputError(f'is {values.capacity}', '--capacity', 'give 1 to 100')
+    _check_opening(values)
+    from crgame_ros.ros.environment import prepare_environment, require_ros
+    require_ros()
+    prepare_environment()
+    from crgame_ros.launcher.interruption import print_now
+    from crgame_ros.study.conduct.reception_run import ReceptionRequest, run_reception
+    from crgame_ros.study.desk.page_markdown import pictures_of
+    folder.check_withdrawals()
+    # Once, before several sessions would do so at once.
+    folder.keep_study(study, values.file, pictures_of(study))
+    asyncio.run(run_reception(ReceptionRequest(
+        study, values.file, folder, values.listen, values.port, values.capacity,
+        values.certificate, values.key), print_now))
     return 0

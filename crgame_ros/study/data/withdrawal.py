@@ -29,6 +29,7 @@ from crgame_ros.study.data.study_data_folder import (
 )
 from crgame_ros.study.data.study_report import write_study_report
 from crgame_ros.study.data.study_rerun import RERUN
+from crgame_ros.study.elsewhere import PRIVATE
 from crgame_ros.study.enrolment import read_enrolment
 from crgame_ros.study.folder import MADE, WITHDRAWALS, WITHDRAWING
 from crgame_ros.study.session_journal import JOURNAL
@@ -224,7 +225,7 @@ class Withdrawal:
         """Return what somebody else has put into the folders of the study and its data."""
         data = self.root / DATA
         known = {STUDY_FILE.parts[0], PARTICIPANTS, DATA, WITHDRAWALS, WITHDRAWING, MADE,
-                 PREREGISTRATION}
+                 PREREGISTRATION, PRIVATE}
         names = {f'{table}.{kind}' for table in TABLE_NAMES for kind in ('csv', 'parquet')}
         names |= {PACKAGE_FILE, PROVENANCE, REPORT_FILE, R_SCRIPT, RUNS, BIDS, RERUN, KEPT,
                   '.lock'}

@@ -52,7 +52,10 @@ def participant_document(desk: Desk) -> dict[str, object]:
         'again': 0 if item is None else _repeats(desk, item),
         'progress': _progress(desk)}
     if item is None or desk.ending:
-        return {**document, 'show': 'over', 'how': how_over(desk), 'tree': _last_page(desk)}
+        how, elsewhere = how_over(desk), session.study.elsewhere
+        return {**document, 'show': 'over', 'how': how, 'tree': _last_page(desk),
+                'code': '' if elsewhere is None else elsewhere.code_for(how),
+                'address': '' if elsewhere is None else elsewhere.address_for(how)}
     if desk.waits:
         return {**document, 'show': 'wait', 'why': 'held'}
     if desk.asks_language:

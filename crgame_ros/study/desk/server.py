@@ -224,7 +224,7 @@ async def serve_desk(desk: Desk, access: Access, private: Path
 
 def _add_pages(app: web.Application, desk: Desk, access: Access,
                experimenters: Invitations) -> None:
-    table = _read_files()
+    table = read_desk_files()
 
     async def participant(request: web.Request) -> web.Response:
         return file_answer(request, table['/'])
@@ -268,7 +268,12 @@ def _add_pages(app: web.Application, desk: Desk, access: Access,
     app.router.add_get('/static/{name:.*}', static)
 
 
-def _read_files() -> Mapping[str, PageFile]:
+def read_desk_files() -> Mapping[str, PageFile]:
+    """
+    Return the files of the pages by their path.
+
+    :raises CrgameError: if a page is not installed.
+    """
     pages = page_directory()
     table: dict[str, PageFile] = {}
     for folder in SHARED:

@@ -72,6 +72,8 @@ export interface OverDocument extends Always {
   show: 'over';
   how: 'done' | 'declined' | 'excluded' | 'ended';
   tree: PageNode[]; // the study's own page about it, empty without one
+  code: string; // for the platform that sent the participant, and where to take it; or empty
+  address: string;
 }
 
 export interface QuestionsDocument extends Always {

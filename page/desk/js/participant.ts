@@ -13,7 +13,7 @@ import { button, pageNodes, pageView } from './page_view.js';
 import { questionForm } from './question_form.js';
 import { Words } from './words.js';
 
-import type { DeskDocument, RefusedMessage, Told, WordsMessage } from './desk_messages.js';
+import type { DeskDocument, OverDocument, RefusedMessage, Told, WordsMessage } from './desk_messages.js';
 
 const ANSWERED = ['questions', 'page', 'break', 'device'];
 const PAGE_KEY = 'crgame.desk.page';
@@ -163,9 +163,7 @@ class ParticipantPage {
         this.#check = new DeviceCheck(shown, words, finish);
         return this.#check.node;
       case 'over':
-        return shown.tree.length > 0
-          ? element('article', { class: 'reading', role: 'status' }, ...pageNodes(shown.tree))
-          : notice(words.of('thanks'), words.of(`over_${shown.how}`));
+        return overView(shown, words);
       case 'wait':
         return notice(words.of('wait'), words.of(`wait_${shown.why}`), true);
       default:
@@ -186,6 +184,20 @@ class ParticipantPage {
         return choose;
       }));
   }
+}
+
+function overView({ tree, how, code, address }: OverDocument, words: Words) {
+  const told = tree.length > 0
+    ? element('article', { class: 'reading', role: 'status' }, ...pageNodes(tree))
+    : notice(words.of('thanks'), words.of(code === '' ? `over_${how}` : `over_${how}_code`));
+  if (code !== '') {
+    told.append(element('p', { class: 'code', text: words.of('code', { code }) }));
+  }
+  if (address !== '') {
+    told.append(element('p', {}, element('a', { href: address, rel: 'noopener noreferrer',
+      text: words.of('to_platform') })));
+  }
+  return told;
 }
 
 function notice(title: string, text: string, waits = false) {
