@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Watches a drive: the participant's pictures, focus and device, unseen stimuli, timing."""
+"""Watches a drive: the participant's link, pictures, focus, device, unseen stimuli; timing."""
 
 from collections.abc import Mapping, Sequence
 import statistics
@@ -25,6 +25,8 @@ class DriveWatch:
 
     def __init__(self, seat: str) -> None:
         self._name = f'cockpit_node: {seat} view'
+        self._link_name = f'cockpit_node: {seat} driver'
+        self._links_s: list[float] = []
         self._rates_hz: list[float] = []
         self._before: tuple[float, bool, bool] | None = None
         self._away_s = self._windowed_s = 0.0
@@ -40,6 +42,10 @@ class DriveWatch:
         :param time_s: of the run's clock [s]
         """
         values = status.values
+        if status.name == self._link_name and time_s > 0.0:
+            delay_ms = status_amount(values, 'round_trip_ms')
+            if delay_ms is not None:
+                self._links_s.append(1e-3 * delay_ms)
         if status.name != self._name or not values.get('shown') or time_s <= 0.0:
             return
         # Another program may send such a status: what is no number is left out.
@@ -80,6 +86,9 @@ class DriveWatch:
         """Return the values so far; those that the page has not told are missing."""
         found: dict[str, float] = {'stimuli': self.stimuli, 'unseen_stimuli': self.unseen,
                                    **self._timing}
+        if self._links_s:
+            found |= {'link_delay_s': round(statistics.median(self._links_s), 4),
+                      'link_delay_max_s': round(max(self._links_s), 4)}
         if self._rates_hz:
             found['view_rate_hz'] = round(statistics.median(self._rates_hz), 1)
         if self._before is not None:

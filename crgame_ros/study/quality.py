@@ -24,6 +24,8 @@ class QualityBounds:
     :param gaps: cycles that were not recorded, at most.
     :param input_delay_s: median delay from the hand to the answer at the page, at most [s]
     :param plans_of_others: plans of other programs than the AVs' planners, at most.
+    :param link_delay_s: median round trip from the page to the simulation and back, at most; the
+        first drive does not begin as long as that to the study's page is longer [s]
     :param view_rate_hz: pictures a second at the page, median, at least [Hz]
     :param unseen_stimuli: stimuli and requests that the page has not shown, at most.
     :param away_s: time for which the page was hidden or without the focus, at most [s]
@@ -44,6 +46,7 @@ class QualityBounds:
     gaps: Bound = 0.0
     input_delay_s: Bound = 0.1
     plans_of_others: Bound = 0.0
+    link_delay_s: Bound = 0.15
     view_rate_hz: Bound = 20.0
     unseen_stimuli: Bound = 0.0
     away_s: Bound = 0.5
@@ -155,6 +158,7 @@ TIMING = {
     'plans_of_others': Check("plans of other programs than the AVs' planners")}
 # Of the participant's page, known during the drive.
 PAGE = {
+    'link_delay_s': Check('round trip to the page', 'ms', 1e3),
     'view_rate_hz': Check('pictures a second', digits=1, least=True),
     'unseen_stimuli': Check('stimuli that were not shown'),
     'away_s': Check('page hidden or without the focus', 's', digits=1),

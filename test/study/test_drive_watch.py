@@ -35,6 +35,19 @@ def test_times_are_between_statuses_and_a_pause_of_them_tells_nothing() -> None:
         'windowed_s': 0.5, 'device_changes': 1}
 
 
+def test_the_link_is_told_by_its_median_and_its_worst_round_trip() -> None:
+    watch = DriveWatch('av0')
+    for time_s, delay_ms in ((0.0, '900.0'), (1.0, '40.0'), (2.0, '200.0'), (3.0, '180.0'),
+                             (4.0, ''), (5.0, 'nan')):
+        watch.add(Status.of('cockpit_node: av0 driver', 0, 'Anna', {'round_trip_ms': delay_ms}),
+                  time_s)
+    values = watch.values()
+    assert (values['link_delay_s'], values['link_delay_max_s']) == (0.18, 0.2)
+    assert QualityBounds().faults(values, PAGE) == [
+        'round trip to the page 180 ms instead of at most 150 ms']
+    assert QualityBounds(link_delay_s=None).faults(values, PAGE) == []
+
+
 def test_a_stimulus_that_no_page_shows_is_unseen() -> None:
     """The second is answered, the third is cut off by the end of the task."""
     watch = DriveWatch('av0')

@@ -12,6 +12,7 @@ import re
 import shutil
 import ssl
 import sys
+import time
 from typing import Any
 
 from aiohttp import (
@@ -26,7 +27,7 @@ from crgame_ros.cockpit.server import listen
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
 from crgame_ros.study.conduct.session_run import SessionRequest
-from crgame_ros.study.desk.desk import Desk
+from crgame_ros.study.desk.desk import Desk, PINGS
 from crgame_ros.study.desk.pages import words_of
 from crgame_ros.study.desk.participant_document import participant_document
 from crgame_ros.study.desk.reception import create_reception_app, Reception
@@ -176,6 +177,45 @@ async def test_a_session_goes_on_after_a_lost_connection_and_another_start(tmp_p
         assert again.desk.session.next_item.id == 'main/2'
         await do_until(again, socket, '')
         await shown(socket, shows('over'))
+        await socket.close()
+
+
+@in_loop
+async def test_a_slow_link_keeps_the_first_drive_from_beginning(tmp_path: Path) -> None:
+    bound_s, slow_s = 0.1, 0.15
+    async with opened(tmp_path, languages=[], before=[], after=[], quality={
+            'link_delay_s': bound_s}) as running, running.browser() as anna:
+        await running.get(anna, running.participant)
+        socket = await running.enter(anna)
+
+        async def ping(count: int, delay_s: float) -> None:
+            """Measure round trips as the page does; each pong comes late by a delay."""
+            measured: dict[str, float] = {}
+            for _ in range(count):
+                sent_s = time.monotonic()
+                await socket.send_json({'type': 'ping', 't': sent_s, **measured})
+                await shown(socket, lambda content: content['type'] == 'pong')
+                await asyncio.sleep(delay_s)
+                measured = {'round_trip_ms': 1e3 * (time.monotonic() - sent_s)}
+
+        await do_until(running, socket, 'main/practice')
+        await ping(PINGS, slow_s)
+        told = participant_document(running.desk)
+        assert (told['show'], told['why']) == ('wait', 'slow')
+        assert told['link']['bound_ms'] == 1e3 * bound_s
+        assert 1e3 * slow_s <= told['link']['median_ms'] <= told['link']['worst_ms']
+        await socket.send_json({'type': 'ready', 'item': 'main/practice'})
+        await ping(1, 0.0)
+        assert not running.desk.session.attempts('main/practice')
+        assert [entry['text'] for entry in running.desk.session.journal.entries
+                if entry['entry'] == 'note'][0].startswith('the link is too slow')
+        # It goes on by itself, and a link that becomes slow later is for the bounds of drives.
+        await ping(2 * PINGS, 0.0)
+        assert participant_document(running.desk)['show'] == 'drive'
+        await do_until(running, socket, 'main/1')
+        await ping(PINGS, slow_s)
+        await do_until(running, socket, '')
+        assert running.desk.session.attempts('main/2') == 1
         await socket.close()
 
 

@@ -130,10 +130,13 @@ _TIMING = (
         ('unseen_stimuli', INTEGER, '1', 'of these, those that the page has not shown'),
         ('away_s', NUMBER, 's', 'time for which the page was hidden or without the focus'),
         ('windowed_s', NUMBER, 's', 'time for which the page did not fill the screen'),
-        ('device_changes', INTEGER, '1', 'changes of the input device'))),
+        ('device_changes', INTEGER, '1', 'changes of the input device'),
+        ('link_delay_max_s', NUMBER, 's', 'longest from the page to the simulation and back, of '
+         'one a second'))),
     flag_column('page_flag', "whether a value of the participant's page is beyond a bound"),
     Column('page_reason', TEXT, '', 'what of it is beyond which bound', empty='nothing is'))
-_WATCHED = ('stimuli', 'unseen_stimuli', 'away_s', 'windowed_s', 'device_changes')
+_WATCHED = ('stimuli', 'unseen_stimuli', 'away_s', 'windowed_s', 'device_changes',
+            'link_delay_max_s')
 _ANSWERED = Column('answered_attempt', INTEGER, '1', 'the attempt after which its questions were '
                    'answered', empty='there are no answers')
 _LEFT_OUT = ('run', 'id', 'role', 'driver', 'vehicle_model', 'planning_problem', 'length', 'width',

@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The desk of a session: the actions of participant and experimenter, and their watchers."""
 
+from collections import deque
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 import logging
+import statistics
 import time
 from typing import Protocol
 
@@ -47,7 +50,25 @@ class Drives(Protocol):
 # During these phases of a drive no other item can come first.
 UNDER_WAY = (DrivePhase.COUNTDOWN, DrivePhase.DRIVING, DrivePhase.ENDED)
 
+# Pings of the last seconds, of which half are needed to judge the link.
+PINGS = 10
+
 _log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class LinkDelay:
+    """
+    Round trips between the participant's page and this machine, of the last seconds.
+
+    :param median_ms: of them [ms]
+    :param worst_ms: the longest [ms]
+    :param bound_ms: what the median may be at most [ms]
+    """
+
+    median_ms: int
+    worst_ms: int
+    bound_ms: int
 
 
 class Desk:
@@ -67,6 +88,8 @@ class Desk:
         # When a page of the participant was heard last; at first now [s since 1970].
         self.heard_s = clock_s()
         self._watchers: list[Callable[[], None]] = []
+        self._round_trips_ms: deque[float] = deque(maxlen=PINGS)
+        self._told_slow = False
         drives.watch(self._drive_changed)
         self._begin_break()
 
@@ -114,6 +137,30 @@ class Desk:
         at = self.clock_s() if began is None else began['at']
         return max(0.0, at + 60.0 * item.what.minutes - self.clock_s())
 
+    @property
+    def slow_link(self) -> LinkDelay | None:
+        """Return the delay that keeps the first drive from beginning; None if nothing does."""
+        bound_s, told_ms = self.session.study.quality.link_delay_s, self._round_trips_ms
+        if bound_s is None or len(told_ms) < PINGS // 2 \
+                or statistics.median(told_ms) <= 1e3 * bound_s \
+                or any(entry.get('run') for entry in self.session.journal.entries):
+            return None
+        return LinkDelay(*(round(value) for value in (
+            statistics.median(told_ms), max(told_ms), 1e3 * bound_s)))
+
+    def hear_round_trip(self, delay_ms: float) -> None:
+        """Take the round trip of a ping of the participant's page [ms]."""
+        before = self.slow_link
+        self._round_trips_ms.append(delay_ms)
+        slow, item = self.slow_link, self.session.next_item
+        if item is None or not is_driven(item) or slow == before:
+            return
+        if slow is not None and not self._told_slow:
+            self._told_slow = True
+            self.session.note(f'the link is too slow for the first drive: {slow.median_ms} ms, at '
+                              f'worst {slow.worst_ms} ms', **self.moment())
+        self._notify()
+
     # Actions of the participant.
 
     def choose_language(self, language: str) -> None:
@@ -154,7 +201,7 @@ class Desk:
         """Report that the participant is ready for a drive."""
         state = self.drives.state
         if state.phase == DrivePhase.READY and state.item == item and not self.waits \
-                and not self.ending:
+                and not self.ending and self.slow_link is None:
             self.drives.ready(item)
 
     # Actions of the experimenter.

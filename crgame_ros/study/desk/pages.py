@@ -177,6 +177,8 @@ class DeskPages:
             if client is self._used:
                 self._is_due = self._is_due or self._is_silent
                 self.desk.heard_s = self.desk.clock_s()
+                if message.round_trip_ms is not None:
+                    self.desk.hear_round_trip(message.round_trip_ms)
                 self._hear(message.model_dump(exclude={'type', 't'}, exclude_none=True))
             self._answer(client, message)
             return

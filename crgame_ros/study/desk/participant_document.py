@@ -4,6 +4,7 @@
 
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import asdict
 import math
 from typing import Any
 
@@ -129,6 +130,9 @@ def _drive(desk: Desk, item: SessionItem) -> dict[str, Any]:
     if state.phase not in (DrivePhase.READY, *UNDER_WAY) or state.item != item.id:
         return {'show': 'wait', 'why': 'failed' if state.phase == DrivePhase.FAILED
                 else 'preparing'}
+    slow = desk.slow_link
+    if slow is not None:
+        return {'show': 'wait', 'why': 'slow', 'link': asdict(slow)}
     drive = {'show': 'drive', 'phase': state.phase.value, 'link': state.link,
              'attempt': state.attempt, 'practice': isinstance(what, PracticeDrives)}
     if isinstance(what, PlannedTrial):

@@ -67,7 +67,11 @@ export interface Always {
 }
 
 export interface PlainDocument extends Always { show: 'language' | 'elsewhere' }
-export interface WaitDocument extends Always { show: 'wait'; why: 'held' | 'preparing' | 'failed' }
+export interface WaitDocument extends Always {
+  show: 'wait';
+  why: 'held' | 'preparing' | 'failed' | 'slow';
+  link?: { median_ms: number; worst_ms: number; bound_ms: number }; // if it is slow
+}
 export interface OverDocument extends Always {
   show: 'over';
   how: 'done' | 'declined' | 'excluded' | 'ended';

@@ -165,7 +165,7 @@ class ParticipantPage {
       case 'over':
         return overView(shown, words);
       case 'wait':
-        return notice(words.of('wait'), words.of(`wait_${shown.why}`), true);
+        return notice(words.of('wait'), words.of(`wait_${shown.why}`, shown.link), true);
       default:
         return element('div', {}, notice(words.of('elsewhere'), words.of('elsewhere_text')),
           element('div', { class: 'go-on' }, button(words.of('here'), 'primary',
