@@ -203,8 +203,13 @@ class LiveDrives:
         opened = self._certificate is not None
         await self._until(lambda: bool(graph.director if opened else graph.cockpit)
                           and director.game is not None, LOADS_S, 'the simulation does not start')
-        self._links = None if self._certificate is None \
-            else await make_links(graph.director, self._certificate)
+        if self._certificate is not None:
+            try:
+                self._links = await make_links(graph.director, self._certificate)
+            except CrgameError:
+                # Without links nobody could drive in this graph: the next try begins another.
+                await self.close()
+                raise
         return director
 
     async def _drive(self, drive: StudyDrive) -> None:

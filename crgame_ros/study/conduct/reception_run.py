@@ -141,6 +141,8 @@ class Sessions:
                 # Ctrl-C goes to the reception only, which ends the sessions.
                 start_new_session=True)
             self._processes[participant] = process
+            if self._is_ending:
+                process.send_signal(signal.SIGINT)
             assert process.stdout is not None
             async for line in process.stdout:
                 text = line.decode('utf-8', 'replace').rstrip()

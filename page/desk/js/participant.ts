@@ -13,7 +13,9 @@ import { button, pageNodes, pageView } from './page_view.js';
 import { questionForm } from './question_form.js';
 import { Words } from './words.js';
 
-import type { DeskDocument, OverDocument, RefusedMessage, Told, WordsMessage } from './desk_messages.js';
+import type {
+  DeskDocument, OverDocument, RefusedMessage, Told, WordsMessage,
+} from './desk_messages.js';
 
 const ANSWERED = ['questions', 'page', 'break', 'device'];
 const PAGE_KEY = 'crgame.desk.page';
