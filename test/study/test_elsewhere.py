@@ -22,6 +22,7 @@ from aiohttp import (
     Fingerprint,
     WSServerHandshakeError,
 )
+from crgame_ros.cli import main
 from crgame_ros.cockpit.access import Access, reachable_addresses
 from crgame_ros.cockpit.server import listen
 from crgame_ros.errors import InputError
@@ -342,3 +343,25 @@ async def test_those_who_arrive_are_led_to_their_sessions_or_told_why_not(tmp_pa
                     assert answer.status == 404, path
     finally:
         await asyncio.wait_for(runner.cleanup(), PATIENCE_S)
+
+
+@pytest.mark.parametrize(('command', 'more', 'message'), [
+    ('serve', (), '--listen'),
+    ('serve', ('--listen', '127.0.0.1', '--capacity', '0'), '--capacity'),
+    ('serve', ('--listen', '127.0.0.1', '--certificate', 'c.pem'), 'belong together'),
+    ('serve', ('--listen', '203.0.113.9'), 'cannot listen'),
+    ('serve', ('--id-of', 'p1'), 'has received nobody yet'),
+    ('run', ('--participant', 'P1', '--certificate', 'c.pem', '--key', 'k.pem'), '--listen'),
+    ('run', ('--participant', 'P1', '--listen', '127.0.0.1', '--certificate', 'c.pem', '--key',
+             'k.pem'), 'there is no such file'),
+    ('run', ('--participant', 'P1', '--absent', 'nan'), '--absent')])
+def test_options_that_cannot_be_used_begin_nothing(
+        command: str, more: tuple[str, ...], message: str, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    write_study(tmp_path / 'study', elsewhere=PLATFORM)
+    out = tmp_path / 'data'
+    assert main(['study', command, str(tmp_path / 'study' / 'study.yaml'), '--out', str(out),
+                 *more]) == 2
+    told = capsys.readouterr().err
+    assert message in told and 'Traceback' not in told
+    assert not out.exists()
