@@ -17,7 +17,9 @@ def test_a_run_ends_without_lines_about_leaked_objects() -> None:
         [sys.executable, '-m', 'crgame_ros.cli', 'offline', str(default_game()), '--planner',
          'reactive', '--duration', '1'], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0
-    assert re.fullmatch(r'0 contacts, (least TTC [0-9.]+ s, )?10 of 10 plans accepted, '
+    # A slow machine shows the progress.
+    assert re.fullmatch(r'(driving ZAM_CutIn-1_1_T-1: [0-9]+ %\n)*'
+                        r'0 contacts, (least TTC [0-9.]+ s, )?10 of 10 plans accepted, '
                         r'nuPlan score hv0 [0-9.]+, av0 [0-9.]+\n',
                         done.stderr)
     assert json.loads(done.stdout)['planners']['av0']['accepted'] > 0
