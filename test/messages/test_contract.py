@@ -96,7 +96,7 @@ def test_slots_are_one_deep_and_documents_latched() -> None:
     for name in ('/<av>/plan_request', '/<av>/plan', '/<v>/driver_command'):
         assert CONTRACT.topic(name).qos.depth == 1
     happenings = ('/trigger', '/seats/order', '/tasks/log', '/tasks/report',
-                  '/instruments/texts')
+                  '/instruments/texts', '/views/pictures')
     for topic in TOPICS:
         if topic.type_name == 'std_msgs/msg/String' and topic.name not in happenings:
             assert topic.qos.durability == 'transient_local', topic.name
