@@ -52,11 +52,12 @@ def test_a_cockpit_is_opened_on_purpose() -> None:
             parse_arguments(words)
 
 
-def test_one_origin_may_show_the_cockpit_within_its_page() -> None:
+def test_named_origins_may_show_the_cockpit_within_its_page() -> None:
     """No origin may unless it is named; without a page, or with a recording's, none can."""
-    assert parse_arguments([]).framed_by == ''
-    request = parse_arguments(['--framed-by', 'http://LocalHost:8070/'])
-    assert request.framed_by == 'http://localhost:8070'
+    assert parse_arguments([]).framed_by == ()
+    request = parse_arguments(['--framed-by', 'http://LocalHost:8070/',
+                               '--framed-by', 'http://[::1]:8071'])
+    assert list(request.framed_by) == ['http://localhost:8070', 'http://[::1]:8071']
     for words, named in ((['--framed-by', 'http://*:8070'], 'argument --framed-by.*is no origin'),
                          (['--framed-by', 'http://a:1', '--headless'], 'there is no page'),
                          (['--framed-by', 'http://a:1', '--replay', 'bag'], '--replay')):
