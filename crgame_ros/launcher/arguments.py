@@ -277,9 +277,6 @@ def _check_opening(request: RunRequest) -> None:
     if request.open_topics and request.own_orders:
         raise InputError('would let others publish what orders do', '--own-orders',
                          'give it without --open-topics')
-    if (request.certificate is None) != (request.key is None):
-        raise InputError('a certificate and its key belong together', '--certificate',
-                         'give --certificate and --key')
     opened = (request.open_cockpit or request.token or request.certificate is not None
               or request.framed_by)
     if request.headless and opened:

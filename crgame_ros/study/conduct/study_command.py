@@ -107,9 +107,6 @@ def _check_opening(values: argparse.Namespace) -> None:
     from crgame_ros.cockpit.exposure import check_certificate
     if not 1 <= values.port <= 65_000:
         raise InputError(f'is {values.port}', '--port', 'give 1 to 65000')
-    if (values.certificate is None) != (values.key is None):
-        raise InputError('a certificate and its key belong together', '--certificate',
-                         'give --certificate and --key')
     if values.listen is None:
         if values.certificate is not None:
             raise InputError('is of no use on this machine alone', '--certificate',
