@@ -50,6 +50,7 @@ from crgame_ros.geometry.shape import Shape  # noqa: E402
 from crgame_ros.roads.network import RoadNetwork  # noqa: E402
 from crgame_ros.traffic.fleet.adoption import Adopted  # noqa: E402
 from crgame_ros.traffic.fleet.world_view import WorldView  # noqa: E402
+from crgame_ros.traffic.lanes import lane_graph  # noqa: E402
 from crgame_ros.traffic.traffic import Traffic  # noqa: E402
 from scenario_traffic import BLOCK, LANE_WIDTH, loaded, motorway, town  # noqa: E402
 from scenario_xml import ScenarioFile, write  # noqa: E402
@@ -118,6 +119,8 @@ def our_town(count: int) -> Traffic:
     with tempfile.TemporaryDirectory() as folder:
         scenario, _ = CommonRoadFileReader(write(ScenarioFile(
             'ZAM_Town-1_1_T-1', town(town_size(count)), (), ('simulated',)), Path(folder))).open()
+    # The largest has 1,022 km of lanes, more than a user's map may have.
+    lane_graph.MAX_LENGTH = math.inf
     spec = TrafficSpec(agents=count, flow=900.0, capacity=count)
     return Traffic(spec, RoadNetwork(scenario.lanelet_network), scenario, (), (), STEP_S,
                    SUBSTEPS, 0, 0)
