@@ -119,7 +119,7 @@ def faults(out: Path, sessions: dict[str, StudySession]) -> Iterator[str]:
         yield f'groups are {dict(groups)}'
     gaze = pq.read_table(out / 'data' / 'runs' / 'gaze.parquet').to_pylist()
     for name in stay:
-        looked = Counter(row['what'] for row in gaze if row['participant'] == name)
+        looked = Counter(row['kind'] for row in gaze if row['participant'] == name)
         print(f'{name} looked at: {dict(looked.most_common())}')
         if not looked:
             yield f'{name}: has no gaze'

@@ -3,10 +3,13 @@
 """The table of the page's files, read once: a request names a key of it, never a path."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+import gzip
 import hashlib
 from pathlib import Path
+import posixpath
+import re
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.page_libraries import find_libraries, PLOTLY, THREE_SCRIPTS
@@ -19,6 +22,11 @@ INDEX = '/'
 LIBRARIES = {'/plotly.js': PLOTLY, **{f'/three/{name}': name for name in THREE_SCRIPTS}}
 TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
          '.ts': 'text/javascript', '.svg': 'image/svg+xml', '.png': 'image/png'}
+_HTML, _SCRIPT = TYPES['.html'], TYPES['.js']
+# Of our own pages, in which a statement begins a line; imports of types are none in the browser.
+_ENTRY = re.compile(rb'<script type="module" src="([^"]+)"')
+_IMPORT = re.compile(rb"^(?:import|export)(?! type\b)(?: [^'\";]*? from)? '(\.[^']+)'",
+                     re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -46,6 +54,15 @@ class PageFile:
         :raises CrgameError: if they cannot be taken out.
         """
         return strip_types(self.source, self.typescript) if self.typescript else self.source
+
+    @cached_property
+    def packed(self) -> bytes:
+        """
+        Return the same by gzip (RFC 1952): a page is a quarter of its size.
+
+        :raises CrgameError: as `body` does.
+        """
+        return gzip.compress(self.body, mtime=0)
 
     @cached_property
     def tag(self) -> str:
@@ -95,7 +112,35 @@ def read_files(directory: Path, prefix: str) -> dict[str, PageFile]:
     """
     paths = [path for path in sorted(directory.rglob('*'))
              if path.suffix in TYPES and path.is_file() and not path.name.endswith('.d.ts')]
-    return {prefix + _served_name(path.relative_to(directory)): _read(path) for path in paths}
+    return _with_preloads({prefix + _served_name(path.relative_to(directory)): _read(path)
+                           for path in paths})
+
+
+def _with_preloads(table: dict[str, PageFile]) -> dict[str, PageFile]:
+    """
+    Let each page name all scripts that it begins with.
+
+    A browser then fetches them at once, instead of finding each only in the one that imports it.
+    """
+    return {path: replace(file, source=_ENTRY.sub(
+        lambda found: b''.join(b'<link rel="modulepreload" href="%s">\n  ' % script.encode()
+                               for script in _imported(table, found[1].decode())) + found[0],
+        file.source)) if file.content_type == _HTML else file for path, file in table.items()}
+
+
+def _imported(table: Mapping[str, PageFile], entry: str) -> list[str]:
+    """Return the paths of all scripts that one imports, and that these import."""
+    found, rest = [entry], [entry]
+    while rest:
+        script = rest.pop()
+        if script in table and table[script].content_type == _SCRIPT:
+            for name in _IMPORT.findall(table[script].source):
+                path = posixpath.normpath(posixpath.join(posixpath.dirname(script),
+                                                         name.decode()))
+                if path not in found:
+                    found.append(path)
+                    rest.append(path)
+    return found[1:]
 
 
 def _served_name(path: Path) -> str:

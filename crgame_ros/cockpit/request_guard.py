@@ -124,13 +124,15 @@ def file_answer(request: web.Request, file: PageFile | None) -> web.Response:
         return web.Response(status=404, text='There is no such file.\n')
     if request.headers.get(hdrs.IF_NONE_MATCH) == f'"{file.tag}"':
         return web.Response(status=304, headers={hdrs.ETAG: f'"{file.tag}"'})
+    packs = file.is_text and 'gzip' in request.headers.get(hdrs.ACCEPT_ENCODING, '')
     try:
-        body = file.body
+        body = file.packed if packs else file.body
     except CrgameError as error:
         return web.Response(status=500, text=f'{error}\n')
     return web.Response(body=body, content_type=file.content_type,
                         charset='utf-8' if file.is_text else None,
-                        headers={hdrs.ETAG: f'"{file.tag}"'})
+                        headers={hdrs.ETAG: f'"{file.tag}"', hdrs.VARY: hdrs.ACCEPT_ENCODING,
+                                 **({hdrs.CONTENT_ENCODING: 'gzip'} if packs else {})})
 
 
 async def _answer(access: Access, request: web.Request,

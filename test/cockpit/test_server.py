@@ -5,6 +5,7 @@
 import asyncio
 import json
 from pathlib import Path
+import re
 import shutil
 import struct
 import time
@@ -37,7 +38,9 @@ async def test_the_page_plotly_and_all_files_of_the_page_are_served(tmp_path: Pa
     async with cockpit(page=page) as running:
         async with running.http.get(f'{running.address}/') as answer:
             assert answer.status == 200 and answer.content_type == 'text/html'
-            assert await answer.read() == (page / 'index.html').read_bytes()
+            lines = (await answer.text()).splitlines()
+            assert [line for line in lines if 'modulepreload' not in line] == [
+                *(page / 'index.html').read_text().splitlines()]
         async with running.http.get(f'{running.address}/plotly.js') as answer:
             assert answer.content_type == 'text/javascript'
             assert b'plotly.js (basic' in (await answer.read())[:200]
@@ -82,6 +85,35 @@ async def test_a_fault_in_a_script_is_told_with_its_place(tmp_path: Path) -> Non
     assert status == 500
     assert answer.endswith(b'\r\n\r\na.ts: line 2, column 1: `enum B { c }` is more than a type, '
                            b'and browsers do not know it\n')
+
+
+@in_loop
+async def test_a_page_names_the_scripts_it_begins_with_and_comes_packed(tmp_path: Path) -> None:
+    """Those that only others import, too, but none of types alone; whoever asks gets it plain."""
+    (tmp_path / 'js').mkdir()
+    for name, text in (
+            ('index.html', '<script type="module" src="/static/js/a.js"></script>'),
+            ('js/a.ts', "import {\n  b,\n} from './b.js';\nimport type { D } from './d.js';\n"),
+            ('js/b.ts', "import { a } from './a.js';\nexport { c } from './c.js';\n"),
+            ('js/c.ts', "import './e.js';\nconst text = '/* from \\'./f.js\\' */';\n"),
+            *((f'js/{name}.ts', 'const x: number = 1;\n' * 100) for name in 'def')):
+        (tmp_path / name).write_text(text)
+    async with cockpit(page=tmp_path) as running:
+        for path, words in (('/', 3), ('/static/js/e.js', 0)):
+            answers = {}
+            for packing in ('gzip', 'identity'):
+                async with running.http.get(running.address + path, headers={
+                        'Accept-Encoding': packing}) as answer:
+                    answers[packing] = await answer.text()
+                    assert answer.headers.get('Content-Encoding', 'identity') == packing
+                    assert answer.headers['Vary'] == 'Accept-Encoding'
+                    size = int(answer.headers['Content-Length'])
+            assert answers['gzip'] == answers['identity'] and size >= len(answers['identity'])
+            assert answers['gzip'].count('modulepreload') == words
+        async with running.http.get(f'{running.address}/') as answer:
+            page = await answer.text()
+    assert re.findall('modulepreload" href="([^"]+)"', page) == [
+        f'/static/js/{name}.js' for name in 'bce']
 
 
 def test_a_missing_page_is_one_clear_error(tmp_path: Path) -> None:

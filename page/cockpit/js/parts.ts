@@ -17,8 +17,8 @@ export const PANELS: { name: string; label: string; saves?: ('plots' | 'tables')
   { name: 'runs', label: 'Runs' },
 ];
 
-// [module, its create function, selector of its root, name in window.crgame]. They are loaded one
-// by one, so that a part that cannot be loaded is named on the page and the others still work.
+// [module, its create function, selector of its root, name in window.crgame]. They begin one by
+// one, so that a part that cannot be loaded is named on the page and the others still work.
 export const PARTS = [
   ['./panels/notices.js', 'createNotices', '#notices', 'notices'],
   ['./person.js', 'createPerson', 'body', 'person'],
