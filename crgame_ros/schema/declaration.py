@@ -155,9 +155,10 @@ def known_keys(kind: type[object]) -> tuple[str, ...]:
 
 
 def sentences_of(kind: type[object]) -> dict[str, str]:
-    """Return the description of each field from the docstring of a class, in one line each."""
-    text = inspect.cleandoc(kind.__doc__ or '')
-    return {name: ' '.join(words.split()).rstrip('.') for name, words in _PARAM.findall(text)}
+    """Return the description of each field from the docstrings of a class, in one line each."""
+    return {name: ' '.join(words.split()).rstrip('.')
+            for base in reversed(kind.__mro__)
+            for name, words in _PARAM.findall(inspect.cleandoc(base.__doc__ or ''))}
 
 
 @functools.cache
