@@ -296,6 +296,11 @@ class StudyFile:
                                  f'name {", ".join(sorted(known)) or "none"}')
 
     @property
+    def has_staircases(self) -> bool:
+        """Return whether a block has a staircase."""
+        return any(block.staircase is not None for block in self.blocks)
+
+    @property
     def all_factors(self) -> tuple[Factor, ...]:
         """Return the factors within participants, and the one between them."""
         return (*self.factors, *((self.groups.factor,) if self.groups is not None else ()))

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plans a participant's trials in order, with crossed conditions and combined settings."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import groupby, product
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.file import Block, StudyFile
@@ -191,6 +191,20 @@ def orders_of(study: StudyFile,
     """
     for group, place in product(study.group_names, range(places)):
         yield group, place, plan_trials(study, place, group)
+
+
+def told_trials(trials: Iterable[PlannedTrial]) -> Iterator[tuple[str, str, str]]:
+    """Yield number, block and condition of trials as text; those of staircases as one."""
+    for (block, stepped), group in groupby(trials, lambda each: (
+            each.block, each.staircase is not None)):
+        of_block = list(group)
+        if not stepped:
+            yield from ((str(each.number), block, each.condition.name) for each in of_block)
+            continue
+        names = list(dict.fromkeys(str(each.staircase) for each in of_block))
+        count = '1 staircase' if len(names) == 1 else f'{len(names)} staircases'
+        yield (f'{of_block[0].number}-{of_block[-1].number}', block,
+               f'{count}, at most {len(of_block)} trials')
 
 
 def drive_seed(study: StudyFile, place: int, group: str) -> str:
