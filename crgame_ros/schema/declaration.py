@@ -194,7 +194,8 @@ def wanted(hint: object, marks: tuple[object, ...] = ()) -> str:
     if special is not None:
         return str(special)
     wording = mark_of(marks, Wording)
-    words = [_wanted(choice, marks) for choice in choices_of(hint) if choice is not types.NoneType]
+    words = [_wanted(plain, (*marks, *inner)) for choice in choices_of(hint)
+             if choice is not types.NoneType for plain, inner in (split(choice),)]
     text = wording.remedy.removeprefix('give ') if wording else ' or '.join(dict.fromkeys(words))
     others = [str(mark.written) for mark in marks
               if isinstance(mark, Meaning) and isinstance(mark.written, str)]
