@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 import random
 import statistics
+import sys
 from typing import Any
 
 from crgame_ros.cli import main
@@ -15,6 +16,9 @@ from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
 from crgame_ros.study.check import check_study
 from crgame_ros.study.data.conducted_study import ConductedStudy
+from crgame_ros.study.data.participant_record import read_participant
+from crgame_ros.study.desk.desk import Desk
+from crgame_ros.study.desk.participant_document import experimenter_document, participant_document
 from crgame_ros.study.file import load_study, StudyFile
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_journal import JOURNAL
@@ -26,6 +30,10 @@ import numpy as np
 import polars
 import pytest
 import yaml
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from desk_support import DrivesWithoutGraph  # noqa: E402, I100
 
 DRIVEN: dict[str, Any] = {'factor': 'gap', 'success': {'drive': 'contacts', 'equals': 0}}
 # The psychometric function of the made observer, in levels: 1 / (1 + exp(SLOPE (level - MIDDLE))).
@@ -315,6 +323,58 @@ def test_a_question_has_to_follow_every_trial(tmp_path: Path) -> None:
     found = [each.text for each in check_study(read(StudyFile, study_with(
         success={'question': 'useful', 'equals': 9}), 'study')) if 'success' in each.text]
     assert len(found) == 1 and 'success: 9 is no answer to "useful"' in found[0]
+
+
+def test_the_journal_of_another_scale_is_refused(tmp_path: Path) -> None:
+    rng = random.Random(3)
+    with session_in(tmp_path) as session:
+        while present(session)[0] != 'steps/3':
+            answer_next(session, rng)
+    other = json.loads(json.dumps(STUDY))
+    other['factors'][0]['levels'][0]['name'] = 'g7'
+    with pytest.raises(InputError, match='tells of the condition "g6/(day|night)", which is not'):
+        session_in(tmp_path, other)
+
+
+def test_groups_have_staircases_of_their_own_settings(tmp_path: Path) -> None:
+    study = STUDY | {'groups': {'name': 'hood', 'levels': [
+        {'name': 'low', 'view': 'driver'}, {'name': 'high', 'view': 'chase'}]}}
+    rng = random.Random(2)
+    with session_in(tmp_path / 'P01', study) as session:
+        while session.next_item is not None:
+            trial = answer_next(session, rng)
+            group = session.allocation
+            assert trial is None or group is not None and trial.condition.settings.view == (
+                'driver' if group.group == 'low' else 'chase')
+        wanted = [item.id for item in session.items]
+    record = read_participant(session.study, tmp_path / 'P01')
+    assert record is not None and record.complete and list(record.items) == wanted
+    assert {name for _, name in record.tracks} == {'day', 'night'}
+    for track in record.tracks.values():
+        assert (track.ended, len(track.reversals), len(track.trials)) in (
+            ('reversals', 4, len(track.judged)), ('at_most', len(track.reversals), 20))
+
+
+def test_pages_tell_no_level_before_it_is_known(tmp_path: Path) -> None:
+    rng = random.Random(2)
+    with session_in(tmp_path) as session:
+        drives = DrivesWithoutGraph(session)
+        desk = Desk(session, drives)
+        while present(session)[0] != 'last/1':
+            item = session.next_item
+            rows = {row['id']: row for row in experimenter_document(desk, {})['items']}
+            for name, row in rows.items():
+                if name.count('/') == 1 and row['kind'] == 'drive' and name.startswith('steps'):
+                    assert bool(row['condition']) == (row['state'] != 'to_come')
+            if isinstance(item.what, PlannedTrial):
+                assert rows[item.id]['condition'] == item.what.condition.name
+            answer_next(session, rng)
+        drives.wake()
+        shown = participant_document(desk)
+        count = sum(isinstance(item.what, PlannedTrial) for item in session.items)
+        assert shown['show'] == 'drive' and shown['number'] == count - 1 < 41
+        assert shown['progress']['drives'] == count
+        assert shown['progress']['of'] == len(session.items)
 
 
 SEEN = """
