@@ -81,8 +81,8 @@ def main() -> int:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--check', action='store_true', help='change nothing')
     values = parser.parse_args()
-    return int(not all([written(DOCS / name, words, columns(), values.check)
-                        for name, words, columns in PARTS]))
+    done = [written(DOCS / name, words, columns(), values.check) for name, words, columns in PARTS]
+    return int(not all(done))
 
 
 if __name__ == '__main__':

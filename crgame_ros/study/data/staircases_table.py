@@ -90,4 +90,3 @@ class StaircaseColumns:
         """Return the values of a participant."""
         return {self._names[whose][name]: value for whose, track in counted_tracks(record).items()
                 for name, value in _results(track).items()}
-
