@@ -211,6 +211,7 @@ class Track:
 
     :param staircase: the rule.
     :param factor: whose levels are the steps.
+    :ivar numbers: of the levels.
     :ivar trials: in their order.
     :ivar level: index of the next trial's level.
     :ivar reversals: indices in `trials`: after these the direction changed.
@@ -219,7 +220,7 @@ class Track:
 
     def __init__(self, staircase: Staircase, factor: Factor) -> None:
         self._staircase, self._last = staircase, len(factor.levels) - 1
-        self._numbers = staircase.numbers_of(factor)
+        self.numbers = staircase.numbers_of(factor)
         self.trials: list[StaircaseTrial] = []
         self.level = staircase.start_of(factor)
         self.reversals: list[int] = []
@@ -272,7 +273,7 @@ class Track:
 
     def value_of(self, trial: StaircaseTrial) -> float:
         """Return the number of a trial's level."""
-        return self._numbers[trial.level]
+        return self.numbers[trial.level]
 
     @property
     def threshold(self) -> Threshold | None:

@@ -12,6 +12,7 @@ from crgame_ros.study.staircase import StaircaseTrial, Track
 
 # Sizes of a plot, which is scaled as a whole [px].
 _WIDTH, _PLOT, _TOP, _BOTTOM, _LEFT = 560, 170, 12, 30, 52
+_ENDS = {'reversals': 'reversals', 'at_most': 'number of trials'}
 _WORDS = {True: 'success', False: 'failure', None: 'neither'}
 
 
@@ -23,7 +24,7 @@ def staircase_section(data: StudyData) -> str:
     rows = [(free(row['participant']), free(row['block']), free(row['staircase']),
              number(row['threshold'], 3), number(row['threshold_sd'], 3),
              f'{row["reversals_used"]} of {row["reversals"]}', str(row['trials']),
-             str(row['steps_beyond']), plain(row['end'] or NOTHING))
+             str(row['steps_beyond']), plain(_ENDS.get(row['end'], NOTHING)))
             for row in data.tables[STAIRCASES.name].to_pylist()]
     if not rows:
         return html + note('No staircase has begun yet.')
@@ -32,7 +33,7 @@ def staircase_section(data: StudyData) -> str:
     html += note('The threshold is the mean of the levels at the last even number of reversals, '
                  'without those of first steps (Levitt 1971). In the tracks, a filled point is a '
                  'success, a hollow one a failure; squares mark reversals, the broken line the '
-                 'threshold. Every participant’s levels are those of the numbers of the levels.')
+                 'threshold.')
     return html + '<div class="plots">' + ''.join(
         _figure(f'{record.id}, {block}' + (f': {name}' if name != 'all' else ''), track)
         for record in data.records for (block, name), track in counted_tracks(record).items()
@@ -51,8 +52,8 @@ def track_svg(track: Track, words: str) -> str:
     :param words: alternative text of the plot.
     """
     trials = [(index, trial) for index, trial in enumerate(track.trials) if trial.done]
-    values = [track.value_of(trial) for _, trial in trials]
-    ticks = axis_ticks(values, 5)
+    # The whole scale, so that tracks can be compared.
+    ticks = axis_ticks(track.numbers, 5)
     low, high = ticks[0], ticks[-1]
     count = max(2, len(trials))
 
