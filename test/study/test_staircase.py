@@ -14,6 +14,13 @@ from typing import Any
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
+from crgame_ros.study.analysis.mixed_model import model_formulas
+from crgame_ros.study.analysis.planned_tests import used_rows
+from crgame_ros.study.analysis.simulated_trials import (
+    measure_models,
+    planned_people,
+    SimulatedTrials,
+)
 from crgame_ros.study.check import check_study
 from crgame_ros.study.data.conducted_study import ConductedStudy
 from crgame_ros.study.data.participant_record import read_participant
@@ -472,6 +479,18 @@ def test_check_and_preregistration_tell_the_plan(made: Path, capsys: pytest.Capt
     text = (file.parent / 'preregistration.md').read_text()
     assert 'Block gaps: staircase of gap, 1-down 1-up from the level middle' in text
     assert '| 1 | gaps: 2 staircases, at most 18 trials, main: ' in text
+
+
+def test_planned_comparisons_leave_the_trials_out(made: Path) -> None:
+    study = ConductedStudy(made).study
+    assert [formula.blocks for formula in model_formulas(study)] == [('main',)]
+    rows = SimulatedTrials(study, planned_people(study, 2), measure_models(study)).rows
+    assert {row['block'] for row in rows} == {'main'} and len(rows) == 8
+    trials = polars.read_parquet(made / 'data' / 'trials.parquet').to_dicts()
+    used = used_rows(study, trials)
+    assert {row['block'] for row in used} == {'main'} and len(used) == 12 < len(trials)
+    script = (made / 'data' / 'analysis.R').read_text()
+    assert 'trials <- trials[!(trials$block %in% c("gaps")), ]' in script
 
 
 def test_a_withdrawn_participant_leaves_the_staircases(made: Path) -> None:
