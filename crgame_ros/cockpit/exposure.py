@@ -181,6 +181,9 @@ def check_certificate(certificate: Path | None, key: Path | None) -> ssl.SSLCont
     """
     Check that a certificate can be used, before anything is started.
 
-    :raises InputError: if it cannot.
+    :raises InputError: if it cannot, or one of both is missing.
     """
+    if (certificate is None) != (key is None):
+        raise InputError('a certificate and its key belong together', '--certificate',
+                         'give --certificate and --key')
     return None if certificate is None or key is None else tls_context(certificate, key)

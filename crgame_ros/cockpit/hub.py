@@ -49,7 +49,7 @@ class Hub:
     All connected clients. Nothing here waits, so a client that reads slowly delays no other.
 
     :param mode: live or replay, for `hello`.
-    :param framed_by: origin of the page that may frame this one, for `hello`.
+    :param framed_by: origins of the pages that may frame this one, for `hello`.
     """
 
     def __init__(self, mode: str, framed_by: str = '') -> None:

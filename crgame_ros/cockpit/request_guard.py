@@ -99,7 +99,7 @@ def header_writer(is_static: Callable[[str], bool], frames: Callable[[web.Reques
 
     :param is_static: returns whether the answer to a path changes only with its tag.
     :param frames: returns the addresses of pages that a page may frame; None for none.
-    :param framed_by: origin of the one page that may frame this one; empty for none.
+    :param framed_by: origins of the only pages that may frame this one, as in the header.
     """
     headers = dict(_HEADERS)
     if framed_by:

@@ -80,7 +80,7 @@ def create_app(backend: Backend, access: Access, library: Library | None, *,
     :param access: access control of the server.
     :param library: scenarios that can be chosen; None for none.
     :param page: the folder of the page; None for that of the cockpit.
-    :param framed_by: origin of the one page that may frame this one; empty for none.
+    :param framed_by: origins of the only pages that may frame this one, as in the header.
     :raises CrgameError: if the page or Plotly is not installed.
     """
     hub = Hub(backend.mode, framed_by)

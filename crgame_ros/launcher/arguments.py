@@ -74,7 +74,7 @@ class RunRequest:
     :param drivers: driver sources of humans by their ids.
     :param countdown_s: time from the readiness of all drivers at pages to the start [s]
     :param start_paused: whether every game waits for a start order.
-    :param framed_by: origin of the only page that may embed the cockpit's page; empty for none.
+    :param framed_by: origins of the only pages that may embed the cockpit's page.
     :param open_topics: whether messages of any program count on every topic, not on those alone
         that the contract names as open.
     :param own_orders: whether services answer the run's own nodes alone.
@@ -104,7 +104,7 @@ class RunRequest:
     drivers: tuple[tuple[str, str], ...] = ()
     countdown_s: float = 3.0
     start_paused: bool = False
-    framed_by: str = ''
+    framed_by: Sequence[str] = ()
     options: tuple[tuple[str, object], ...] = ()
     open_topics: bool = False
     own_orders: bool = False
@@ -180,9 +180,9 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add('--certificate', type=Path, metavar='FILE',
         help='PEM file for TLS, with --key (default: --open-cockpit makes one by openssl)')
     add('--key', type=Path, metavar='FILE', help='PEM file with the key of the certificate')
-    add('--framed-by', type=_origin, default=argparse.SUPPRESS, metavar='ORIGIN',
-        help="let the page at this origin, such as http://127.0.0.1:8070, show the cockpit's "
-        'within it (default: none may)')
+    add('--framed-by', type=_origin, action='append', default=argparse.SUPPRESS, metavar='ORIGIN',
+        help="let pages of this origin, such as http://127.0.0.1:8070, show the cockpit's "
+        'within them; may be given several times (default: none may)')
     add('--replay', type=Path, metavar='BAG',
         help='show a recording in the page instead of running a game; goes with --port, --listen '
         'and --token')
@@ -277,9 +277,6 @@ def _check_opening(request: RunRequest) -> None:
     if request.open_topics and request.own_orders:
         raise InputError('would let others publish what orders do', '--own-orders',
                          'give it without --open-topics')
-    if (request.certificate is None) != (request.key is None):
-        raise InputError('a certificate and its key belong together', '--certificate',
-                         'give --certificate and --key')
     opened = (request.open_cockpit or request.token or request.certificate is not None
               or request.framed_by)
     if request.headless and opened:

@@ -102,7 +102,7 @@ def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
             'port': request.port, 'listen': cockpit_host(request), 'token': request.token,
             'open_cockpit': request.open_cockpit,
             'certificate': _path(request.certificate), 'key': _path(request.key),
-            'framed_by': request.framed_by, 'private': plan.private,
+            'framed_by': ' '.join(request.framed_by), 'private': plan.private,
             'seats': [human.id for human in plan.setup.humans],
             'folders': [plan.setup.game.scenario.resolve().parent],
             'directory': plan.cockpit, 'runs': plan.folder,

@@ -32,8 +32,9 @@ class CockpitNode(Node):
         self._private = ExitStack()
         self._opening = self._declare_exposure()
         self._framed_by: str = declare('framed_by', '', ParameterDescriptor(
-            description='origin of the one page that may show this one within it, such as '
-                        'http://127.0.0.1:8070; empty: no page may', read_only=True)).value
+            description='origins of the only pages that may show this one within them, such as '
+                        'http://127.0.0.1:8070, with spaces between them; empty: no page may',
+            read_only=True)).value
         self._seats: list[str] = declare('seats', ['hv0'], ParameterDescriptor(
             description='seats for which open_cockpit makes links', read_only=True)).value
         self._folders: list[str] = declare('folders', [''], ParameterDescriptor(
@@ -88,7 +89,7 @@ class CockpitNode(Node):
         access = opening.access()
         app = create_app(LiveBackend(self, Path(self._runs) if self._runs else None), access,
                          Library(folders, work / 'uploads', work / 'games'),
-                         framed_by=read_origin(self._framed_by) if self._framed_by else '')
+                         framed_by=' '.join(map(read_origin, self._framed_by.split())))
         if self._runs:
             archive = RunArchive(Path(self._runs), Path(self._archive) if self._archive else None)
             add_run_routes(app, archive, work)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Marks for `Annotated`, which express conditions that types cannot."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -168,24 +169,24 @@ class Folder:
     """A mark of the field with the folder of the file's relative names; it is never in a file."""
 
 
-class Special:
+class Special(ABC):
     """The base of marks for values that need their own reader."""
 
+    @abstractmethod
     def read(self, given: object, where: str, key: str, base: Path) -> object:
         """
         Read a value.
 
         :raises InputError: if it is invalid.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def json_schema(self) -> dict[str, object]:
         """Return the JSON Schema of the value."""
-        raise NotImplementedError
 
+    @abstractmethod
     def __str__(self) -> str:
         """Return the kind of value that is required, as text after "give"."""
-        raise NotImplementedError
 
 
 class Named:
@@ -200,16 +201,16 @@ class Named:
         return named_file(name, Path.cwd())
 
 
-class Sought:
+class Sought(ABC):
     """A mark of a file that may be given by another name than that of its path."""
 
+    @abstractmethod
     def find(self, name: str, base: Path) -> Path:
         """
         Return the path of the file.
 
         :raises InputError: if a name that is no file name is unknown.
         """
-        raise NotImplementedError
 
 
 def named_file(name: str, base: Path) -> str:

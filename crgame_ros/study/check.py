@@ -24,6 +24,7 @@ from crgame_ros.study.questionnaire import load_questionnaire
 from crgame_ros.study.session_script import (
     drives_of,
     Fields,
+    members_of,
     PracticeDrives,
     session_of,
     SessionItem,
@@ -80,8 +81,8 @@ def check_study(study: StudyFile,
 
     :param progress: called with the share that is done, 0 to 1.
     """
-    found = [*_steps(study), *_conditions_on_answers(study), *_staircases(study),
-             *_balance(study)]
+    found = [*_steps(study), *_conditions_on_answers(study), *_together(study),
+             *_staircases(study), *_balance(study)]
     drives = list(drives_of(study))
     tasks: set[str] = set()
     for number, (name, settings) in enumerate(drives):
@@ -262,9 +263,24 @@ def _impossible(where: str, when: AnswerTest, question: Question) -> Iterator[St
         yield StudyFinding('error', f'{where}: "{name}" has no numbers')
 
 
+def _together(study: StudyFile) -> Iterator[StudyFinding]:
+    try:
+        members = members_of(study)
+    except CrgameError as error:
+        yield StudyFinding('error', str(error))
+        return
+    if members > 1 and study.participants % members:
+        yield StudyFinding('warning', f'seats: {study.participants} participants do not make '
+                                      f'whole groups of {members}, who drive together')
+    if members > 1 and study.analysis.comparisons:
+        yield StudyFinding('warning', 'seats: the planned tests take each participant as one of '
+                                      'their own, and those who drive together are not')
+
+
 def _balance(study: StudyFile) -> Iterator[StudyFinding]:
     groups = study.group_names
-    places = study.participants // len(groups)
+    members = max(len(settings.seats or ('',)) for _, settings in drives_of(study))
+    places = study.participants // (len(groups) * members)
     if study.participants % len(groups):
         yield StudyFinding('warning', f'groups: {study.participants} participants do not make '
                                       f'{len(groups)} groups of equal size')

@@ -51,6 +51,9 @@ class DriveState:
     :param work: for the experimenter: the present work.
     :param text: for the experimenter: the failure, in the words of the program that failed.
     :param doubts: what of the drive's data is beyond a bound of the study so far.
+    :param confederate: address of the cockpit's page for the experimenter who drives too; empty if
+        they do not.
+    :param awaits_others: whether the participant is ready, and others are not.
     """
 
     phase: DrivePhase = DrivePhase.NONE
@@ -62,3 +65,5 @@ class DriveState:
     work: DriveWork = DriveWork.NONE
     text: str = ''
     doubts: tuple[Excess, ...] = ()
+    confederate: str = ''
+    awaits_others: bool = False

@@ -24,6 +24,7 @@ class DriveWatch:
     """
 
     def __init__(self, seat: str) -> None:
+        self._seat = seat
         self._name = f'cockpit_node: {seat} view'
         self._link_name = f'cockpit_node: {seat} driver'
         self._links_s: list[float] = []
@@ -64,8 +65,10 @@ class DriveWatch:
             self._devices.append(device)
 
     def add_tasks(self, entries: Sequence[TaskEntry]) -> None:
-        """Process entries of the log of tasks."""
+        """Process entries of the log of tasks; ignore those for other seats."""
         for entry in entries:
+            if entry.seat != self._seat:
+                continue
             key = entry.task, entry.number
             if entry.what in ('stimulus', 'request'):
                 self.stimuli += 1

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A participant's session: finished items, the next item, and resuming after any end."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 import time
@@ -21,6 +21,7 @@ from crgame_ros.study.screening import Exclusion
 from crgame_ros.study.session_journal import SessionEvent, SessionJournal
 from crgame_ros.study.session_script import (
     Fields,
+    is_driven,
     items_before_groups,
     PracticeDrives,
     session_of,
@@ -40,15 +41,21 @@ class ParticipantSession:
         first that is free.
     :param clock_s: seconds since 1970.
     :param group: that the experimenter gives, where the study wants one of a new participant.
+    :param members: ids of those who drive together, this one among them, in the order of their
+        seats; nobody for a participant who drives alone.
     :ivar allocation: to a group; None before it, and in a study without groups.
+    :ivar partners: sessions of the others who drive together.
     :raises InputError: if the study cannot be planned, another process has the session open, or
-        the participant has begun another study, or has another place or group.
+        the participant has begun another study, or has another place, group or partner.
     """
 
     def __init__(self, study: StudyFile, folder: Path, participant: str, place: int | None = None,
-                 clock_s: Callable[[], float] = time.time, *, group: str | None = None) -> None:
+                 clock_s: Callable[[], float] = time.time, *, group: str | None = None,
+                 members: Sequence[str] = ()) -> None:
         self.study, self.participant = study, participant
         self._folder, self._clock_s = folder, clock_s
+        self._members = tuple(members)
+        self.partners: tuple[ParticipantSession, ...] = ()
         self.allocation: Allocation | None = None
         for name in study.group_names:
             session_of(study, 0, name)
@@ -76,13 +83,14 @@ class ParticipantSession:
             if place is None:
                 place = free_place(self._folder.parent) if begun is None else begun['place']
             self.place = int(place)
-            self._planned = session_of(self.study, self.place) if self.study.groups is None \
-                else items_before_groups(self.study)
+            member = self._members.index(self.participant) if self._members else 0
+            self._planned = session_of(self.study, self.place, member=member) \
+                if self.study.groups is None else items_before_groups(self.study)
             mine = {'participant': self.participant, 'place': self.place,
                     'items': [item.id for item in self._planned]}
             if begun is None:
                 self._add(SessionEvent.BEGUN, **mine, **({} if group is None else {
-                    'group': group}))
+                    'group': group}), **({'members': self._members} if self._members else {}))
         if begun is not None and {name: begun[name] for name in mine} != mine:
             raise self._other_plan()
         if allocated is not None:
@@ -112,7 +120,12 @@ class ParticipantSession:
                           'put the study file back, or name another participant')
 
     def _check_given(self, group: str | None, begun: Mapping[str, Any] | None) -> None:
-        """Refuse a group where none is given, none where one is, and another than before."""
+        """Refuse other partners and a group where none is given, none where one is, or another."""
+        together = self._members if begun is None else tuple(begun.get('members') or ())
+        if together != self._members:
+            raise InputError('began with ' + (' and '.join(together) or 'nobody'),
+                             ' and '.join(self._members or (self.participant,)),
+                             f'give --participant {",".join(together or (self.participant,))}')
         groups = self.study.groups
         if groups is None or groups.allocation != 'given':
             if group is not None:
@@ -143,6 +156,7 @@ class ParticipantSession:
             last = next(entry['item'] for entry in reversed(self.journal.entries)
                         if entry['entry'] == SessionEvent.FINISHED)
             self._add(SessionEvent.EXCLUDED, item=last, reason=rule.told, page=rule.page)
+            self._leave_partners(rule.told)
         elif self._awaits_group and self.done >= {item.id for item in self.items}:
             self._allocate(field_answers(self.items, answers))
 
@@ -187,6 +201,35 @@ class ParticipantSession:
         """Record the software versions with which the session begins or resumes."""
         self._add(SessionEvent.OPENED, software=dict(software))
 
+    def join(self, partners: Sequence['ParticipantSession']) -> None:
+        """
+        Drive together with others from now on; mend what a killed process left half done.
+
+        A drive that one journal has and another has not is driven again.
+
+        :param partners: sessions of the others, which join these as well.
+        """
+        self.partners = tuple(partners)
+        all_of_them = (self, *partners)
+        for partner in partners:
+            partner.partners = tuple(each for each in all_of_them if each is not partner)
+        for each in all_of_them:
+            if each._has_ended:
+                each._leave_partners('')
+        for item in filter(is_driven, self.items):
+            if len({(item.id in each.done, each._practice_drives(item.id))
+                    for each in all_of_them}) > 1:
+                for each in all_of_them:
+                    each._repeat(item.id, 'the journals of those who drove together differ')
+
+    def _leave_partners(self, reason: str) -> None:
+        """End the sessions of those who cannot drive without this participant."""
+        for partner in self.partners:
+            if not partner._has_ended and any(
+                    is_driven(item) and item.id not in partner.done for item in partner.items):
+                partner._add(SessionEvent.ENDED, reason=': '.join(filter(None, (
+                    f'{self.participant}, who drove too, takes part no longer', reason))))
+
     @property
     def done(self) -> frozenset[str]:
         """Return the ids of finished or skipped items."""
@@ -229,6 +272,11 @@ class ParticipantSession:
         """Return the language that the participant chose last; None before a choice."""
         return next((entry['language'] for entry in reversed(self.journal.entries)
                      if entry['entry'] == SessionEvent.LANGUAGE), None)
+
+    @property
+    def page_language(self) -> str:
+        """Return the language of the participant's page."""
+        return self.language or self.study.language
 
     def choose_language(self, language: str) -> None:
         """
@@ -366,21 +414,27 @@ class ParticipantSession:
         if isinstance(item.what, Fields) and groups is not None and groups.deciding_fields:
             raise InputError('decides on the group', item.id,
                              'let it be answered, or end the session')
-        self._add(SessionEvent.SKIPPED, item=item.id, reason=reason)
+        for each in (self, *(self.partners if is_driven(item) else ())):
+            each._add(SessionEvent.SKIPPED, item=item.id, reason=reason)
         self._settle()
 
     def repeat(self, item: str, reason: str) -> None:
         """
         Repeat a finished item; its earlier entries stay in the journal.
 
-        With a trial, the questions after it are repeated too: they are about its last drive.
+        With a trial, the questions after it are repeated too: they are about its last drive. All
+        who drove together drive it again.
         """
-        done = self.done
         found = next((each for each in self.items if each.id == item), None)
-        if found is None or item not in done:
+        if found is None or item not in self.done:
             raise InputError('is not done', item[:60], 'name an item that is')
+        for each in (self, *(self.partners if is_driven(found) else ())):
+            each._repeat(item, reason)
+
+    def _repeat(self, item: str, reason: str) -> None:
+        done = self.done
         self._add(SessionEvent.REPEATED, item=item, reason=reason)
-        what = found.what
+        what = next(each.what for each in self.items if each.id == item)
         if not isinstance(what, PlannedTrial):
             return
         for after in self.items:
@@ -398,6 +452,7 @@ class ParticipantSession:
     def end(self, reason: str, **told: object) -> None:
         """End the session before its last item, for good."""
         self._add(SessionEvent.ENDED, reason=reason, **told)
+        self._leave_partners(reason)
 
     def _now(self) -> SessionItem:
         item = self.next_item

@@ -56,7 +56,8 @@ _TYPES: dict[str, type] = {
     **dict.fromkeys(('attempt', 'place', 'contacts', 'departures', 'drives', 'slot'), int),
     **dict.fromkeys(('time_s', 'end_time_s', 'start_at', 'asked_at', 'shown_at', 'answered_at',
                      'taken_s', 'clean_s'), float),
-    **dict.fromkeys(('held', 'good'), bool), **dict.fromkeys(('items', 'doubts', 'asked'), list),
+    **dict.fromkeys(('held', 'good'), bool),
+    **dict.fromkeys(('items', 'doubts', 'asked', 'members'), list),
     **dict.fromkeys(('answers', 'software', 'after_s', 'quality', 'consent', 'strata'), dict)}
 # Times of the wall clock are the largest numbers; until the year 5138 [s since 1970].
 _LARGEST = 1e11

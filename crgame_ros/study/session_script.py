@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
+from crgame_ros.errors import InputError
 from crgame_ros.study.file import Block, Break, Practice, Step, StepEntry, StudyFile
 from crgame_ros.study.trial_plan import (
     blocks_of,
@@ -14,7 +15,7 @@ from crgame_ros.study.trial_plan import (
     plan_trials,
     PlannedTrial,
 )
-from crgame_ros.study.trial_settings import drawn, laid, TrialSettings
+from crgame_ros.study.trial_settings import drawn, laid, seated, TrialSettings
 
 
 @dataclass(frozen=True)
@@ -56,12 +57,14 @@ def items_before_groups(study: StudyFile) -> tuple[SessionItem, ...]:
             *_steps('before', study.before))
 
 
-def session_of(study: StudyFile, place: int, group: str = '') -> tuple[SessionItem, ...]:
+def session_of(study: StudyFile, place: int, group: str = '',
+               member: int = 0) -> tuple[SessionItem, ...]:
     """
     Return the session of a participant.
 
     :param place: among all participants, or in the group, from 0 on.
     :param group: of the participant; empty in a study without groups.
+    :param member: number of the participant among those who drive together, from 0 on.
     :raises InputError: if the study cannot be planned.
     """
     items = list(items_before_groups(study))
@@ -70,7 +73,51 @@ def session_of(study: StudyFile, place: int, group: str = '') -> tuple[SessionIt
         items += _block(study, block, place, group,
                         [trial for trial in trials if trial.block == block.name])
     items += _steps('after', study.after, group=group)
-    return tuple(items)
+    return tuple(_seated(item, member) for item in items)
+
+
+def settings_of(item: SessionItem) -> TrialSettings | None:
+    """Return the settings of an item that is driven; None for others."""
+    if isinstance(item.what, PlannedTrial):
+        return item.what.condition.settings
+    return item.what.settings if isinstance(item.what, PracticeDrives) else None
+
+
+def is_driven(item: SessionItem) -> bool:
+    """Return whether an item consists of drives."""
+    return isinstance(item.what, PlannedTrial | PracticeDrives)
+
+
+def _seated(item: SessionItem, member: int) -> SessionItem:
+    settings, what = settings_of(item), item.what
+    if settings is None:
+        return item
+    own = seated(settings, member)
+    if isinstance(what, PlannedTrial):
+        return replace(item, what=replace(what, condition=replace(what.condition, settings=own)))
+    assert isinstance(what, PracticeDrives)
+    return replace(item, what=replace(what, settings=own))
+
+
+def members_of(study: StudyFile) -> int:
+    """
+    Return the number of participants who drive together; 1 if each drives alone.
+
+    :raises InputError: if it differs between the drives, or nobody can say who is in which group.
+    """
+    counts = {name: len(settings.seats or ('',)) for name, settings in drives_of(study)}
+    one, *others = sorted(counts, key=lambda name: counts[name])
+    if others and counts[one] != counts[others[-1]]:
+        raise InputError(f'has other "seats" than {others[-1]}', one,
+                         'let as many people take part in all drives')
+    if counts[one] > 1 and study.groups is not None:
+        raise InputError('is for participants who drive alone', 'groups',
+                         'leave out "groups", or "seats"')
+    stepped = next((block.name for block in study.blocks if block.staircase is not None), None)
+    if counts[one] > 1 and stepped is not None:
+        raise InputError('has a staircase, which answers of one participant decide on',
+                         f'blocks: {stepped}', 'leave out "staircase", or "seats"')
+    return counts[one]
 
 
 def drives_of(study: StudyFile) -> Iterator[tuple[str, TrialSettings]]:

@@ -21,23 +21,27 @@ from crgame_ros.yaml_text import read_yaml
 PERFECT, NONE = 'perfect', 'none'
 
 
-def seat_of(settings: TrialSettings, game: Game) -> str:
+def seats_of(settings: TrialSettings, game: Game) -> tuple[str, ...]:
     """
-    Return the participant's vehicle: a human's, or an AV that may be taken over.
+    Return the participants' vehicles: each a human's, or an AV that may be taken over.
 
     :param game: whose AVs are listed.
     :raises InputError: if the game has no human, or no vehicle of that name.
     """
     humans = [human.id for human in game.humans]
     ids = [*humans, *(av.id for av in game.avs or ())]
-    if settings.seat is None and not humans:
+    if settings.seats is None and settings.seat is None and not humans:
         raise InputError('has no human', settings.game or 'trial', 'give the game one: humans: '
                          '[{id: hv0, driver: cockpit}], or name an AV as "seat"')
-    seat = humans[0] if settings.seat is None else settings.seat
-    if seat not in ids:
-        raise InputError(f'has no human or AV "{seat}"', settings.game or 'trial',
-                         f'name {" or ".join(ids)} as "seat"')
-    return seat
+    seats = settings.seats or (settings.seat or humans[0],)
+    for seat in seats:
+        if seat not in ids:
+            raise InputError(f'has no human or AV "{seat}"', settings.game or 'trial',
+                             f'name {" or ".join(ids)} as a seat')
+    if settings.confederate is not None and settings.confederate not in humans:
+        raise InputError(f'has no human "{settings.confederate}"', settings.game or 'trial',
+                         f'name {" or ".join(humans) or "none"} as "confederate"')
+    return seats
 
 
 def trial_game(settings: TrialSettings, driver: str) -> Game:
@@ -45,7 +49,7 @@ def trial_game(settings: TrialSettings, driver: str) -> Game:
     Build the game of a trial.
 
     :param settings: of the trial, combined with all outer settings.
-    :param driver: of the participant's seat.
+    :param driver: of the seats of participants and of the experimenter.
     :raises InputError: if a file cannot be used, or the settings do not fit the game.
     """
     game = _written_game(settings)
@@ -65,24 +69,27 @@ def trial_game(settings: TrialSettings, driver: str) -> Game:
 
 
 def _seated(settings: TrialSettings, driver: str, game: Game) -> Game:
-    """Return the game with driver, tasks and gaze in the participant's vehicle, alone."""
-    seat = seat_of(settings, game)
+    """Return the game with driver, tasks and gaze in the participants' vehicles, alone."""
+    seats = seats_of(settings, game)
+    driven = {*seats, settings.confederate}
     for human in game.humans:
-        if human.id != seat and human.driver == COCKPIT:
-            raise InputError(f'{human.id} waits for a second person', settings.game or 'trial',
-                             'give it another driver, such as idle, or take it out of the game')
-    for task in game.tasks:
-        if task.seat not in (None, seat):
-            raise InputError(f'task {task.name} is for {task.seat}, and the participant sits in '
-                             f'{seat}', settings.game or 'trial', 'leave out its "seat"')
-    for gaze in game.instruments.gaze if game.instruments is not None else ():
-        if gaze.seat not in (None, seat):
-            raise InputError(f'gaze {gaze.stream} is of {gaze.seat}, and the participant sits in '
-                             f'{seat}', settings.game or 'trial', 'leave out its "seat"')
+        if human.id not in driven and human.driver == COCKPIT:
+            raise InputError(f'{human.id} waits for another person', settings.game or 'trial',
+                             'give it another driver, such as idle, name it in "seats" or as '
+                             '"confederate", or take it out of the game')
+    gazes = game.instruments.gaze if game.instruments is not None else ()
+    for what, seat in (*((f'task {task.name}', task.seat) for task in game.tasks),
+                       *((f'gaze {gaze.stream}', gaze.seat) for gaze in gazes)):
+        if seat is None and len(seats) > 1:
+            raise InputError(f'{what} does not say whose it is', settings.game or 'trial',
+                             f'give it "seat": {" or ".join(seats)}')
+        if seat is not None and seat not in seats:
+            raise InputError(f'{what} is for {seat}, and nobody who takes part sits there',
+                             settings.game or 'trial', f'name {" or ".join(seats)} as its "seat"')
     return replace(
-        game, instruments=game.instruments and game.instruments.seated([seat]),
-        tasks=tuple(replace(task, seat=seat) for task in game.tasks),
-        humans=tuple(replace(human, driver=driver) if human.id == seat else human
+        game, instruments=game.instruments and game.instruments.seated(seats),
+        tasks=tuple(replace(task, seat=task.seat or seats[0]) for task in game.tasks),
+        humans=tuple(replace(human, driver=driver) if human.id in driven else human
                      for human in game.humans))
 
 
@@ -96,7 +103,8 @@ def _written_game(settings: TrialSettings) -> Game:
         raise InputError('names no game', 'trial', 'give "game" or "scenario" to the study, a '
                          'block or a level')
     # Without a human all vehicles are AVs, and the participant sits in one of them.
-    humans = (HumanSpec('hv0'),) if settings.seat in (None, 'hv0') else ()
+    humans = (HumanSpec('hv0'),) if settings.seat in (None, 'hv0') \
+        or 'hv0' in (settings.seats or ()) else ()
     return Game(scenario, humans=humans)
 
 

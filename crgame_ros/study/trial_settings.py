@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The settings of a trial, which cascade from the study to its blocks, levels and trials."""
 
+from collections import Counter
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 import random
 from typing import Annotated, ClassVar, Literal
 
+from crgame_ros.errors import InputError
 from crgame_ros.game.events import EventList
 from crgame_ros.game.instruments_spec import InstrumentsSpec
 from crgame_ros.game.task_spec import TaskList, TaskSpec
@@ -28,6 +30,9 @@ class TrialSettings:
         near its first AV.
     :param seat: the participant's vehicle; the game's first human by default. An AV drives itself
         until the participant takes it over.
+    :param seats: the vehicles of several participants who drive together, instead of `seat`: one
+        of each, in the order in which `--participant` names them.
+    :param confederate: a human of the game whom the experimenter drives.
     :param planner: of all AVs, instead of the game's.
     :param options: of that planner.
     :param perception: file with the `perception` of all AVs, `perfect`, or `own` for the game's.
@@ -53,6 +58,8 @@ class TrialSettings:
     game: Annotated[str, Named(), Wording(r'[\s\S]+', 'name a game file')] | None = None
     scenario: Path | None = None
     seat: str | None = None
+    seats: Annotated[tuple[str, ...], Listed(2, 4, 'vehicle')] | None = None
+    confederate: str | None = None
     planner: Annotated[str, Named(), Wording(r'[\s\S]+', 'name a planner')] | None = None
     options: dict[str, object] | None = None
     perception: Annotated[str, Named()] | None = None
@@ -71,7 +78,12 @@ class TrialSettings:
     labels: dict[str, object] | None = None
 
     def check(self) -> None:
-        """Refuse labels that are no texts."""
+        """Refuse labels that are no texts, and vehicles of several people."""
+        if self.seat is not None and self.seats is not None:
+            raise InputError('is given beside "seats"', 'seat', 'give one of them')
+        for name, count in Counter((*(self.seats or (self.seat,)), self.confederate)).items():
+            if name is not None and count > 1:
+                raise InputError(f'names {name} twice', 'seats', 'give each person one vehicle')
         for name in self.labels or {}:
             self.label_of(name, '')
 
@@ -87,6 +99,9 @@ class TrialSettings:
         # Options belong to one planner; another planner does not inherit them.
         if 'planner' in given and 'options' not in given:
             given['options'] = None
+        # One of them is instead of the other.
+        given |= {other: None for one, other in (('seat', 'seats'), ('seats', 'seat'))
+                  if one in given}
         if self.labels is not None:
             given['labels'] = {**(outer.labels or {}), **self.labels}
         return replace(outer, **given, events=(*outer.events, *self.events),
@@ -97,6 +112,11 @@ def tasks_over(outer: tuple[TaskSpec, ...], inner: tuple[TaskSpec, ...]) -> tupl
     """Return outer and inner tasks; an inner one replaces an outer one of the same name."""
     names = {task.name for task in inner}
     return (*(task for task in outer if task.name not in names), *inner)
+
+
+def seated(settings: TrialSettings, member: int) -> TrialSettings:
+    """Return the settings for one of several participants in a drive, numbered from 0 on."""
+    return settings if settings.seats is None else replace(settings, seat=settings.seats[member])
 
 
 NOTHING = TrialSettings()

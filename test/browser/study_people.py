@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 import re
 import signal
+import ssl
 import subprocess
 import sys
 import tempfile
@@ -24,6 +25,8 @@ import websocket
 # Targets for a kill: the participant's browser, and three processes of the program.
 VICTIMS = ('page', 'simulation', 'launcher', 'study')
 _LOOK_S = 0.2
+# The certificate is made by the program itself.
+_TRUSTING = ssl._create_unverified_context()
 
 
 class _KeepRedirect(urllib.request.HTTPRedirectHandler):
@@ -41,7 +44,8 @@ class Experimenter:
     """
 
     def __init__(self, link: str) -> None:
-        opener = urllib.request.build_opener(_KeepRedirect)
+        opener = urllib.request.build_opener(_KeepRedirect, urllib.request.HTTPSHandler(
+            context=_TRUSTING))
         try:
             opener.open(link)
             self.cookie = ''
@@ -55,7 +59,8 @@ class Experimenter:
         self._count += 1
         with closing(websocket.create_connection(
                 f'{self._address.replace("http", "ws", 1)}/ws/experimenter', cookie=self.cookie,
-                origin=self._address, timeout=30)) as connection:
+                origin=self._address, timeout=30,
+                sslopt={'cert_reqs': ssl.CERT_NONE, 'check_hostname': False})) as connection:
             connection.send(json.dumps({'type': kind, 'id': self._count, **fields}))
 
 
@@ -67,11 +72,15 @@ class StudySession:
     :param out: folder of its data.
     :param participant: id.
     :param port: of the pages.
+    :param listen: address at which the pages are served over TLS; None for this machine alone.
     """
 
-    def __init__(self, file: Path, out: Path, participant: str, port: int) -> None:
+    def __init__(self, file: Path, out: Path, participant: str, port: int,
+                 listen: str | None = None) -> None:
         self.command = [sys.executable, '-m', 'crgame_ros.cli', 'study', 'run', str(file),
-                        '--participant', participant, '--out', str(out), '--port', str(port)]
+                        '--participant', participant, '--out', str(out), '--port', str(port),
+                        *(() if listen is None else ('--listen', listen))]
+        self._is_elsewhere = listen is not None
         self.folder = out / 'participants' / participant
         self.answers: dict[str, Any] = {}
         # (name, run's clock as the page showed it when the message was sent) [s]
@@ -93,7 +102,7 @@ class StudySession:
 
     def _open(self) -> None:
         self._profile = Path(tempfile.mkdtemp(prefix='crgame_study_'))
-        self._end_browser = open_browser(self._profile)
+        self._end_browser = open_browser(self._profile, trusting=self._is_elsewhere)
         self._browser = self._end_browser.__enter__()
         self._browser.open(self.page)
         self._robot = StudyRobot(self._browser)
@@ -187,9 +196,10 @@ class StudySession:
 
 
 @contextmanager
-def study_session(file: Path, out: Path, participant: str, port: int) -> Iterator[StudySession]:
+def study_session(file: Path, out: Path, participant: str, port: int,
+                  listen: str | None = None) -> Iterator[StudySession]:
     """Begin or resume a participant's session, and end it afterwards."""
-    session = StudySession(file, out, participant, port)
+    session = StudySession(file, out, participant, port, listen)
     try:
         yield session
     finally:

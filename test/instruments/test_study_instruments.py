@@ -68,5 +68,5 @@ def test_gaze_is_recorded_and_is_of_the_participant(tmp_path: Path) -> None:
     made = trial_game(laid(_settings(settings)), 'cockpit')
     assert describe_game(build_setup(made)).gaze_seats == ('av0',)
     other = settings | {'instruments': {'gaze': [{'stream': 'Eyes', 'seat': 'hv0'}]}}
-    with pytest.raises(InputError, match='the participant sits in av0'):
+    with pytest.raises(InputError, match='is for hv0, and nobody who takes part'):
         trial_game(laid(_settings(other)), 'cockpit')

@@ -4,6 +4,7 @@
 
 from pathlib import Path
 
+from crgame_ros.cockpit.exposure import check_certificate
 from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import cockpit_host, parse_arguments, RunRequest
 from crgame_ros.launcher.run_plan import effective_setup
@@ -45,18 +46,21 @@ def test_a_cockpit_is_opened_on_purpose() -> None:
     request = parse_arguments(['--open-cockpit', '--certificate', 'c.pem', '--key', 'k.pem'])
     assert cockpit_host(request) == '0.0.0.0' and cockpit_host(RunRequest()) == '127.0.0.1'
     assert cockpit_host(parse_arguments(['--open-cockpit', '--listen', '10.0.0.4'])) == '10.0.0.4'
-    for words, named in ((['--certificate', 'c.pem'], '--key'), (['--key', 'k.pem'], '--key'),
-                         (['--headless', '--token'], 'there is no page'),
+    for pair in ((Path('c.pem'), None), (None, Path('k.pem'))):
+        with pytest.raises(InputError, match='give --certificate and --key'):
+            check_certificate(*pair)
+    for words, named in ((['--headless', '--token'], 'there is no page'),
                          (['--replay', 'bag', '--open-cockpit'], '--replay')):
         with pytest.raises(InputError, match=named):
             parse_arguments(words)
 
 
-def test_one_origin_may_show_the_cockpit_within_its_page() -> None:
+def test_named_origins_may_show_the_cockpit_within_its_page() -> None:
     """No origin may unless it is named; without a page, or with a recording's, none can."""
-    assert parse_arguments([]).framed_by == ''
-    request = parse_arguments(['--framed-by', 'http://LocalHost:8070/'])
-    assert request.framed_by == 'http://localhost:8070'
+    assert parse_arguments([]).framed_by == ()
+    request = parse_arguments(['--framed-by', 'http://LocalHost:8070/',
+                               '--framed-by', 'http://[::1]:8071'])
+    assert list(request.framed_by) == ['http://localhost:8070', 'http://[::1]:8071']
     for words, named in ((['--framed-by', 'http://*:8070'], 'argument --framed-by.*is no origin'),
                          (['--framed-by', 'http://a:1', '--headless'], 'there is no page'),
                          (['--framed-by', 'http://a:1', '--replay', 'bag'], '--replay')):

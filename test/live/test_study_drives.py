@@ -50,8 +50,8 @@ class Participant:
         self.folder = folder
         self.session = ParticipantSession(study, folder, 'P01', 0)
         self.loop = asyncio.new_event_loop()
-        self.drives = LiveDrives(self.session, folder, lambda: 'en', 8150,
-                                 lambda: ['--countdown', '0.2'])
+        self.drives = LiveDrives([self.session], folder, 8150, lambda: ['--countdown', '0.2'])
+        self.rider = self.drives.riders[0]
         self._thread = threading.Thread(target=self.loop.run_until_complete, args=(self._run(),))
         self._page: PageClient | None = None
         self.graphs: list[int] = []
@@ -76,8 +76,8 @@ class Participant:
         assert not self._thread.is_alive()
 
     def wait_for(self, phase: DrivePhase, item: str) -> None:
-        wait_until(lambda: self.drives.state.phase is phase and self.drives.state.item == item,
-                   f'{item} to be {phase}; it is {self.drives.state}')
+        wait_until(lambda: self.rider.state.phase is phase and self.rider.state.item == item,
+                   f'{item} to be {phase}; it is {self.rider.state}')
 
     def begin(self, item: str, factor: float = 1.0) -> None:
         """Claim the seat of a trial that is ready, set its pace, and confirm to be ready."""
@@ -94,7 +94,7 @@ class Participant:
             'claim', seat='hv0', device='')['ok'], 'the seat')
         self._page.hold_keys('hv0', [1, 0, 0, 0])
         self._page.order('rate', factor=factor)
-        self.loop.call_soon_threadsafe(self.drives.ready, item)
+        self.loop.call_soon_threadsafe(self.rider.ready, item)
 
     @property
     def page(self) -> PageClient:
@@ -124,15 +124,15 @@ def journal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[dict[str,
         person.begin('main/1')
         person.begin('main/2', SLOWEST)
         person.wait_for(DrivePhase.DRIVING, 'main/2')
-        wait_until(lambda: (person.drives.state.time_s or 0.0) > 0.5, 'some of the run')
-        person.call(person.drives.abort, 'a telephone rang')
+        wait_until(lambda: (person.rider.state.time_s or 0.0) > 0.5, 'some of the run')
+        person.call(person.rider.abort, 'a telephone rang')
         person.wait_for(DrivePhase.READY, 'main/2')
         person.stands()
         person.begin('main/2')
         person.begin('main/3', SLOWEST)
         person.wait_for(DrivePhase.DRIVING, 'main/3')
         person.call(person.session.skip, 'no time left')
-        person.call(person.drives.wake)
+        person.call(person.rider.wake)
         for action in ('stop', 'reset'):
             person.begin('main/4', SLOWEST)
             person.wait_for(DrivePhase.DRIVING, 'main/4')
@@ -140,7 +140,7 @@ def journal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[dict[str,
             person.wait_for(DrivePhase.READY, 'main/4')
         person.begin('main/4')
         wait_until(lambda: person.session.next_item is None, 'the end')
-        wait_until(lambda: person.drives.state.phase is DrivePhase.NONE, 'the graph to end')
+        wait_until(lambda: person.rider.state.phase is DrivePhase.NONE, 'the graph to end')
         person._thread.join(90.0)
         assert not any(is_node(pid) for pid in person.graphs)
     entries = read_journal(folder)

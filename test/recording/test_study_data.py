@@ -190,7 +190,8 @@ def test_bids_files_hold_what_happened(studied: Studied) -> None:
     assert lines.pop() == '' and {line.count('\t') for line in lines} == {
         len(lines[0].split('\t')) - 1}
     rows = list(csv.DictReader(lines, dialect='excel-tab'))
-    assert json.loads(events.with_suffix('.json').read_text('utf-8')).keys() == rows[0].keys()
+    assert json.loads(events.with_suffix('.json').read_text('utf-8')).keys() == {
+        'TaskName', 'TaskDescription', 'StimulusPresentation', *rows[0]}
     trials = [(row['trial'], row['attempt'], row['name'], row['duration'])
               for row in rows if row['trial_type'] == 'trial']
     assert trials == [('1', '1', 'aborted', '2.5'), ('1', '2', 'time', '1.25'),

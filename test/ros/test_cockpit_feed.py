@@ -3,6 +3,7 @@
 """The cockpit's handling of good and bad messages, and of seats that change."""
 
 from array import array
+import asyncio
 from dataclasses import replace
 import json
 from typing import Any
@@ -16,6 +17,7 @@ from crgame_ros.game.file import load_game
 from crgame_ros.game.instruments_spec import GazeSpec, InstrumentsSpec
 from crgame_ros.game.view_documents import VIEW_PICTURE
 from crgame_ros.messages.status_values import read_status
+from crgame_ros.nodes.cockpit.backend import LEAST_PICTURE_S
 from crgame_ros.ros.messages import from_time, to_time
 from crgame_ros.simulation.setup import build_setup, Setup
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -213,12 +215,17 @@ def test_the_page_of_a_seat_alone_tells_what_its_view_shows(setup: Setup) -> Non
             with pytest.raises(InputError, match=why):
                 await graph.ask(client, 'picture', picture=shown)
         await graph.until(lambda: graph.node.count_subscribers('/views/pictures'), 'the peer')
-        for name in ('first', 'hasty', 'hasty'):
+        began_s = asyncio.get_running_loop().time()
+        for name in ('first', *['hasty'] * 50):
             await graph.ask(page, 'picture', picture=picture(name))
-        await graph.pause(0.1)
+        took_s = asyncio.get_running_loop().time() - began_s
+        await graph.pause(2 * LEAST_PICTURE_S)
         await graph.ask(page, 'picture', picture=picture('last'))
         await graph.until(lambda: 'last' in told(graph), 'the pictures')
-        assert told(graph) == ['first', 'last']
+        first, *hasty, last = told(graph)
+        assert (first, last) == ('first', 'last')
+        # On a busy machine some of them are not hasty.
+        assert len(hasty) <= took_s / LEAST_PICTURE_S
     lived(check)
 
 

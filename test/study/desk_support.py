@@ -8,11 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.study.desk.desk import is_driven
 from crgame_ros.study.drive_state import DrivePhase, DriveState
 from crgame_ros.study.file import load_study, StudyFile
 from crgame_ros.study.participant_session import ParticipantSession
-from crgame_ros.study.session_script import PracticeDrives
+from crgame_ros.study.session_script import is_driven, PracticeDrives
 from PIL import Image
 import yaml
 

@@ -92,8 +92,8 @@ async def opened(folder: Path, **changed: Any) -> AsyncIterator[Opened]:
     study = write_study(folder / 'study', **changed)
     private = folder / '.private'
     private.mkdir(exist_ok=True)
-    request = SessionRequest(study, folder / 'P07', 'P07', 0, listen=ADDRESS)
-    with ParticipantSession(study, request.folder, 'P07', 0) as session:
+    request = SessionRequest(study, {'P07': folder / 'P07'}, 0, listen=ADDRESS)
+    with ParticipantSession(study, folder / 'P07', 'P07', 0) as session:
         desk = Desk(session, DrivesWithoutGraph(session, step_s=0.02))
         runner, lines = await serve_desk(desk, request.exposure(private).access(), private)
         participant, experimenter = (re.findall(r'https\S+', line)[0] for line in lines)

@@ -29,7 +29,7 @@ from crgame_ros.study.desk.participant_document import experimenter_document, pa
 from crgame_ros.study.file import load_study, StudyFile
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_journal import JOURNAL
-from crgame_ros.study.session_script import PracticeDrives, session_of
+from crgame_ros.study.session_script import members_of, PracticeDrives, session_of
 from crgame_ros.study.staircase import Staircase, StaircaseTrial, Track
 from crgame_ros.study.trial_plan import PlannedTrial
 from crgame_ros.study.trial_settings import Factor
@@ -316,6 +316,12 @@ def test_a_staircase_stands_alone_in_its_block() -> None:
     with pytest.raises(InputError, match='only blocks with a staircase have'):
         read(StudyFile, STUDY | {'analysis': {'comparisons': [
             {'measure': 'mean_speed_m_per_s', 'factor': 'gap'}]}}, 'study')
+
+
+def test_who_drives_together_has_no_staircase() -> None:
+    study = read(StudyFile, STUDY | {'settings': {'seats': ['hv0', 'hv1']}}, 'study')
+    with pytest.raises(InputError, match='blocks: steps: has a staircase.*or "seats"'):
+        members_of(study)
 
 
 def test_a_question_has_to_follow_every_trial(tmp_path: Path) -> None:

@@ -116,8 +116,8 @@ def test_labels_of_tasks_know_languages(tmp_path: Path) -> None:
     _, settings = next(drives_of(study))
     assert [settings.label_of('radio', language) for language in ('en', 'de', 'fr')] == [
         'Find a station', 'Sender suchen', 'Find a station']
-    drive = StudyDrive(session_of(study, 0)[0], settings, 'hv0', tmp_path)
-    query = parse_qs(urlsplit(drive.link('http://127.0.0.1:1', 'de', 'k')).query)
+    drive = StudyDrive(session_of(study, 0)[0], settings, ('hv0',), tmp_path)
+    query = parse_qs(urlsplit(drive.link('http://127.0.0.1:1', 'hv0', 'de', 'k')).query)
     assert json.loads(query['labels'][0]) == {'radio': 'Sender suchen', 'other': 'x'}
     assert 'labels: other: no drive has this task' in told(study)
     with pytest.raises(InputError, match='labels: radio'):
@@ -140,7 +140,7 @@ def test_tasks_are_for_the_seat_of_the_participant(tmp_path: Path) -> None:
     ({'settings': {'game': CUT_IN, 'seat': 'hv7'}}, 'has no human or AV "hv7"'),
     ({'settings': {'game': CUT_IN, 'duration': 2, 'seat': 'av0', 'tasks': [
         {'name': 'drt', 'seat': 'hv0', 'detection_response': {}}]}},
-     'task drt is for hv0, and the participant sits in av0; leave out its "seat"'),
+     'task drt is for hv0, and nobody who takes part sits there; name av0 as its "seat"'),
     ({'settings': {'game': CUT_IN, 'duration': 2, 'tasks': [
         {'name': 'drt', 'detection_response': {}}, {'name': 'over', 'take_over': {'key': 'Enter'}}
         ]}}, 'tasks drt and over: both are answered by Enter'),

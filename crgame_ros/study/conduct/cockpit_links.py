@@ -11,15 +11,16 @@ from crgame_ros.errors import CrgameError
 _PATIENCE_S = 20.0
 
 
-async def make_links(director: str, certificate: Path) -> tuple[str, str]:
+async def make_links(director: str, certificate: Path, drivers: int) -> tuple[str, ...]:
     """
-    Return a link to drive any seat and one to watch, each for one browser.
+    Return a link to watch, and some to drive any seat, each for one browser.
 
     A game chosen later may have other seats than the one with which the cockpit began, so the
     links that it prints do not do.
 
     :param director: the link to direct, which is used up.
     :param certificate: of the cockpit.
+    :param drivers: number of links to drive.
     :raises CrgameError: if the cockpit makes none.
     """
     trusted = Fingerprint(bytes.fromhex(fingerprint(certificate).replace(':', '')))
@@ -30,10 +31,10 @@ async def make_links(director: str, certificate: Path) -> tuple[str, str]:
                                  timeout=ClientTimeout(total=_PATIENCE_S)) as http:
             async with http.get(director, ssl=trusted) as answer:
                 await answer.read()
-            for role in ('drive', 'watch'):
+            for role in ('watch', *('drive',) * drivers):
                 async with http.post(f'{page}api/invite', ssl=trusted, json={'role': role},
                                      headers={'X-Crgame': '1'}) as answer:
                     links.append(str((await answer.json())['link']))
     except (ClientError, TimeoutError, ValueError, KeyError) as error:
         raise CrgameError(f'the cockpit makes no links ({error})') from error
-    return links[0], links[1]
+    return tuple(links)

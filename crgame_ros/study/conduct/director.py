@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The study's node in the graph, which chooses games and starts, stops and follows runs."""
 
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -28,7 +29,7 @@ class Director:
 
     :param domain_id: of the graph.
     :ivar status: of the run.
-    :ivar drive_watch: gets statuses and tasks of the present drive; None without one.
+    :ivar drive_watches: get statuses and tasks of the present drive.
     """
 
     def __init__(self, domain_id: int) -> None:
@@ -43,12 +44,11 @@ class Director:
         self._events = endpoints.polled('/scenario/events')
         self._diagnostics = endpoints.polled('/diagnostics', depth=_QUEUE)
         self._tasks = endpoints.polled(TASK_LOG.topic, depth=_QUEUE)
-        self._verdicts: PolledSubscription | None = None
-        self._seat = ''
+        self._verdicts: dict[str, PolledSubscription] = {}
         self._stamp_ns = 0
         self.status = RunStatus()
         self.game: GameDocument | None = None
-        self.drive_watch: DriveWatch | None = None
+        self.drive_watches: tuple[DriveWatch, ...] = ()
 
     @property
     def epoch(self) -> int:
@@ -66,17 +66,17 @@ class Director:
         self._read_game()
         self._read_clock()
         self._read_events()
-        for slot in (self._diagnostics, self._verdicts):
+        for slot in (self._diagnostics, *self._verdicts.values()):
             for _ in range(_QUEUE):
-                message = None if slot is None else slot.pop()
+                message = slot.pop()
                 if message is None:
                     break
                 stamp_ns = from_time(message.header.stamp)
                 if self.game is not None and stamp_ns >= self.game.scheduler.clock_offset_ns:
                     for status in map(read_status, message.status):
                         self.status.add(status, self.time_s)
-                        if self.drive_watch is not None:
-                            self.drive_watch.add(status, self.time_s)
+                        for watch in self.drive_watches:
+                            watch.add(status, self.time_s)
         self._read_tasks()
 
     async def load(self, game: Path) -> None:
@@ -101,14 +101,13 @@ class Director:
         self._endpoints.diagnostics.publish(
             f'study_node: {subject}', DiagnosticStatus.OK, text, values, self._stamp_ns)
 
-    def watch(self, seat: str) -> None:
-        """Subscribe to the verdicts on a vehicle."""
-        if self._verdicts is not None and seat != self._seat:
-            self._endpoints.release(self._verdicts)
-            self._verdicts = None
-        if self._verdicts is None:
-            self._verdicts = self._endpoints.polled('/<v>/drivability', seat)
-        self._seat = seat
+    def watch(self, seats: Sequence[str]) -> None:
+        """Subscribe to the verdicts on some vehicles alone."""
+        for seat in self._verdicts.keys() - set(seats):
+            self._endpoints.release(self._verdicts.pop(seat))
+        for seat in seats:
+            if seat not in self._verdicts:
+                self._verdicts[seat] = self._endpoints.polled('/<v>/drivability', seat)
 
     def close(self) -> None:
         """Leave the graph."""
@@ -146,8 +145,8 @@ class Director:
             # Another program may publish a malformed document there.
             with suppress(InputError):
                 log = TASK_LOG.read(message.data)
-                if self.drive_watch is not None and log.epoch == self.epoch:
-                    self.drive_watch.add_tasks(log.entries)
+                for watch in self.drive_watches if log.epoch == self.epoch else ():
+                    watch.add_tasks(log.entries)
 
     def _read_clock(self) -> None:
         message = self._clock.latest()

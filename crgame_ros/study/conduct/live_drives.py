@@ -4,7 +4,6 @@
 
 import asyncio
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 import secrets
 import time
@@ -14,13 +13,13 @@ from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, run_folder
 from crgame_ros.study.conduct.cockpit_links import make_links
 from crgame_ros.study.conduct.director import Director
+from crgame_ros.study.conduct.rider import Rider
 from crgame_ros.study.conduct.study_drive import (
     clean_s,
     cut_short,
     Disturbance,
     outcome_of,
     RESET,
-    settings_of,
     StudyDrive,
     write_drive,
 )
@@ -28,9 +27,7 @@ from crgame_ros.study.conduct.study_graph import StudyGraph
 from crgame_ros.study.drive_state import DrivePhase, DriveState, DriveWork
 from crgame_ros.study.drive_watch import DriveWatch
 from crgame_ros.study.participant_session import ParticipantSession
-from crgame_ros.study.quality import Excess, PAGE, TIMING
-from crgame_ros.study.session_journal import SessionEvent
-from crgame_ros.study.session_script import PracticeDrives, SessionItem
+from crgame_ros.study.session_script import is_driven, PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 
 LOOK_S = 0.02
@@ -51,72 +48,63 @@ class _LostGraphError(Exception):
 
 class LiveDrives:
     """
-    Conducts a participant's drives, in one graph as long as it runs.
+    Conducts the drives of those who drive together, in one graph as long as it runs.
 
-    :param session: the session.
-    :param folder: of the participant.
-    :param language: returns that of the participant.
+    :param sessions: of the participants, in the order of their seats; joined if there are several.
+    :param folder: of the first participant, which has the recordings.
     :param port: of the cockpit.
     :param more: returns further arguments of the launcher.
     :param certificate: of the cockpit, if it is opened to other machines by links.
+    :ivar riders: the participants' parts, in the same order.
     """
 
-    def __init__(self, session: ParticipantSession, folder: Path, language: Callable[[], str],
-                 port: int, more: Callable[[], Sequence[str]] = tuple,
+    def __init__(self, sessions: Sequence[ParticipantSession], folder: Path, port: int,
+                 more: Callable[[], Sequence[str]] = tuple,
                  certificate: Path | None = None) -> None:
-        self._session, self._folder, self._language = session, folder, language
+        self.riders = tuple(Rider(session, self) for session in sessions)
+        self._folder = folder
         self._port, self._more, self._certificate = port, more, certificate
-        # To drive and to watch, of the present graph.
-        self._links: tuple[str, str] | None = None
+        # Of the present graph: to watch, and for each who drives.
+        self._links: tuple[str, ...] | None = None
+        # By which the cockpit recognises the experimenter who drives.
         self._key = secrets.token_hex(16)
+        self._phase, self._item = DrivePhase.NONE, ''
         self._graph: StudyGraph | None = None
         self._director: Director | None = None
         # The drive that the graph has loaded but not yet driven.
         self._loaded: StudyDrive | None = None
-        self._state = DriveState()
-        self._changed: list[Callable[[], None]] = []
         self._news = asyncio.Event()
-        self._ready = ''
         self._abort: str | None = None
         self._deaths_s: list[float] = []
 
     @property
-    def state(self) -> DriveState:
-        """Return the state of the present or next drive."""
-        if self._director is None or self._state.phase not in (
-                DrivePhase.DRIVING, DrivePhase.ENDED):
-            return self._state
-        return replace(self._state, time_s=self._director.time_s)
-
-    def watch(self, changed: Callable[[], None]) -> None:
-        """Set the callback for changes of the state or the session."""
-        self._changed.append(changed)
+    def time_s(self) -> float | None:
+        """Return the clock of the present run [s]; None without a graph."""
+        return None if self._director is None else self._director.time_s
 
     def wake(self) -> None:
-        """Report that the session has advanced."""
+        """Report that a session has advanced."""
         self._news.set()
-
-    def ready(self, item: str) -> None:
-        """Report that the participant is ready for a drive."""
-        if self._state.phase is DrivePhase.READY and self._state.item == item:
-            self._ready = item
-            self._news.set()
+        if len(self.riders) > 1:
+            # What one does may change the sessions of the others.
+            for rider in self.riders:
+                rider.tell()
 
     def abort(self, reason: str) -> None:
         """End the present drive; it is repeated."""
-        if self._state.phase in (DrivePhase.COUNTDOWN, DrivePhase.DRIVING):
+        if self._phase in (DrivePhase.COUNTDOWN, DrivePhase.DRIVING):
             self._abort = reason
             self._news.set()
 
     def record(self, kind: str, text: str) -> None:
         """Add a note or marker to the present recording, if there is one."""
-        if self._director is not None and self._state.phase is DrivePhase.DRIVING:
+        if self._director is not None and self._phase is DrivePhase.DRIVING:
             self._director.poll()
             self._director.record(kind, text)
 
     async def run(self) -> None:
         """Prepare and conduct drives until the session is over."""
-        while self._session.next_item is not None:
+        while any(rider.session.next_item is not None for rider in self.riders):
             item = self._next()
             if item is None:
                 # Recordings are finished while the participant answers the last questions.
@@ -136,8 +124,10 @@ class LiveDrives:
     async def close(self) -> None:
         """End the graph; a present drive does not count."""
         if self._is_under_way:
-            self._session.abort('the study was ended', self._state.item)
-        self._state, self._loaded = DriveState(), None
+            self._abort_all(self._item, 'the study was ended')
+        self._phase, self._item, self._loaded = DrivePhase.NONE, '', None
+        for rider in self.riders:
+            rider.enter(DriveState())
         graph, self._graph = self._graph, None
         if self._director is not None:
             self._director.close()
@@ -147,29 +137,32 @@ class LiveDrives:
 
     @property
     def _is_under_way(self) -> bool:
-        return self._state.phase in (DrivePhase.COUNTDOWN, DrivePhase.DRIVING, DrivePhase.ENDED)
+        return self._phase in (DrivePhase.COUNTDOWN, DrivePhase.DRIVING, DrivePhase.ENDED)
+
+    def _abort_all(self, item: str, reason: str) -> None:
+        for rider in self.riders:
+            rider.session.abort(reason, item)
 
     def _next(self) -> SessionItem | None:
         """Return the next item to drive, even if other items come before it."""
-        if self._session.next_item is None:
+        sessions = [rider.session for rider in self.riders]
+        if any(session.next_item is None for session in sessions):
             return None
-        done = self._session.done
-        return next((item for item in self._session.items
-                     if item.id not in done and settings_of(item) is not None), None)
+        done = sessions[0].done
+        return next((item for item in sessions[0].items
+                     if item.id not in done and is_driven(item)), None)
 
     def _is_due(self, item: SessionItem) -> bool:
-        now = self._session.next_item
-        return now is not None and now.id == item.id
+        return all(rider.is_due(item.id) for rider in self.riders)
 
     async def _conduct(self, item: SessionItem) -> None:
-        """Prepare an item, and drive it once it is due and the participant is ready."""
+        """Prepare an item, and drive it once it is due and all participants are ready."""
         drive = await self._prepare(item)
-        self._ready = ''
+        for rider in self.riders:
+            rider.is_ready = False
         while self._next() is item:
-            due = self._is_due(item)
-            # The page may load its frame while the participant still answers.
-            self._set_phase(DrivePhase.READY if due else DrivePhase.NONE, item.id, drive=drive)
-            if due and self._ready == item.id:
+            self._set_phase(DrivePhase.READY, item.id, drive=drive)
+            if self._is_due(item) and all(rider.is_ready for rider in self.riders):
                 await self._drive(drive)
                 return
             await self._wait()
@@ -189,7 +182,7 @@ class LiveDrives:
             epoch = director.epoch
             await director.load(drive.game)
             await self._until(lambda: director.epoch > epoch, LOADS_S, 'the game does not begin')
-        director.watch(drive.seat)
+        director.watch(drive.seats)
         await self._until(lambda: director.status.run == 'paused', LOADS_S,
                           'the simulation does not get ready')
         self._loaded = drive
@@ -206,7 +199,8 @@ class LiveDrives:
                           and director.game is not None, LOADS_S, 'the simulation does not start')
         if self._certificate is not None:
             try:
-                self._links = await make_links(graph.director, self._certificate)
+                self._links = await make_links(graph.director, self._certificate,
+                                               len(self.riders) + 1)
             except CrgameError:
                 # Without links nobody could drive in this graph: the next try begins another.
                 await self.close()
@@ -215,19 +209,21 @@ class LiveDrives:
 
     async def _drive(self, drive: StudyDrive) -> None:
         """Drive once, from the start to a closed recording."""
-        item, director, session = drive.item, self._directs(), self._session
+        item, director = drive.item, self._directs()
         assert self._graph is not None
         epoch = director.epoch
         folder = run_folder(self._graph.folder, epoch)
         run = str(folder.relative_to(self._folder))
         self._loaded, self._abort = None, None
         asked_at_s = time.time()
-        attempt = session.start(run)
+        attempt = max(rider.session.start(run) for rider in self.riders)
         self._set_phase(DrivePhase.COUNTDOWN, item.id, attempt=attempt, drive=drive)
         await director.start()
         began_at_s = 0.0
         disturbance = Disturbance(LOST_S)
-        watch = director.drive_watch = DriveWatch(drive.seat)
+        for rider, seat in zip(self.riders, drive.seats, strict=True):
+            rider.drive_watch = DriveWatch(seat)
+        director.drive_watches = tuple(rider.drive_watch for rider in self.riders)
         while director.status.run != 'ended':
             if director.status.run == 'running' and not began_at_s:
                 began_at_s = time.time()
@@ -237,59 +233,57 @@ class LiveDrives:
                                 item=item.id, condition=condition, attempt=attempt)
                 self._set_phase(DrivePhase.DRIVING, item.id, attempt=attempt, drive=drive)
             if began_at_s and self._abort is None:
-                self._abort = disturbance.check(director.status.seats_lost.get(drive.seat, False))
+                self._abort = disturbance.check(any(
+                    director.status.seats_lost.get(seat, False) for seat in drive.seats))
             if self._abort is None and director.epoch != epoch:
                 self._abort = cut_short(RESET)
             if self._abort is not None or not self._is_due(item):
                 await self._break_off(item, self._abort)
                 return
-            self._tell_doubts(watch)
+            for rider in self.riders:
+                rider.tell_doubts()
             await self._poll()
         if reason := cut_short(director.status.reason):
             await self._break_off(item, reason)
             return
         self._set_phase(DrivePhase.ENDED, item.id, attempt=attempt, drive=drive)
-        told = {'run': run, 'attempt': attempt, 'asked_at': asked_at_s, 'start_at': began_at_s,
-                **outcome_of(director.status, drive.seat, director.time_s)}
+        told = {'run': run, 'attempt': attempt, 'asked_at': asked_at_s, 'start_at': began_at_s}
         await self._until(lambda: _is_closed(folder), CLOSES_S, 'the recording is not closed')
-        watch.add_timing(director.status.timing)
-        doubts = self._doubts(watch)
-        told |= {'quality': watch.values(), 'doubts': list(map(str, doubts))}
-        step = session.study.quality.next_step(doubts, self._repeats(item))
+        for rider in self.riders:
+            rider.drive_watch.add_timing(director.status.timing)
+        doubts = {str(doubt): doubt for rider in self.riders for doubt in rider.doubts}
+        step = self.riders[0].session.study.quality.next_step(
+            tuple(doubts.values()), self.riders[0].repeats(item.id, DOUBTFUL))
         if isinstance(item.what, PlannedTrial) and step == 'repeat':
-            session.abort(f'{DOUBTFUL}{"; ".join(map(str, doubts))}', item.id)
+            self._abort_all(item.id, f'{DOUBTFUL}{"; ".join(doubts)}')
             self._set_phase(DrivePhase.PREPARING, item.id, work=DriveWork.AGAIN)
             return
-        if isinstance(item.what, PracticeDrives):
-            wanted_s = item.what.practice.seconds
-            told['clean_s'] = clean_s(director.status, drive.seat, director.time_s)
-            session.practised(told['clean_s'] >= wanted_s, **told)
-        else:
-            if step == 'stop':
-                session.hold(True)
-            session.finish(**told)
+        self._finish(drive, told, hold=step == 'stop')
         self._set_phase(DrivePhase.NONE)
 
-    def _doubts(self, watch: DriveWatch) -> tuple[Excess, ...]:
-        return tuple(self._session.study.quality.excesses(watch.values(), {**TIMING, **PAGE}))
+    def _finish(self, drive: StudyDrive, told: dict[str, object], hold: bool) -> None:
+        """
+        Note a complete drive in all journals.
 
-    def _tell_doubts(self, watch: DriveWatch) -> None:
-        """Tell what is beyond a bound as soon as it is."""
-        doubts = self._doubts(watch)
-        if doubts != self._state.doubts and self._state.phase is DrivePhase.DRIVING:
-            self._state = replace(self._state, doubts=doubts)
-            self._tell()
-
-    def _repeats(self, item: SessionItem) -> int:
-        """Return how often a drive came again because of its data."""
-        return sum(entry['entry'] == SessionEvent.ABORTED and entry['item'] == item.id
-                   and str(entry.get('reason')).startswith(DOUBTFUL)
-                   for entry in self._session.journal.entries)
+        :param told: what is the same for all participants.
+        :param hold: whether the sessions wait for the experimenter then.
+        """
+        status, end_s, what = self._directs().status, self._directs().time_s, drive.item.what
+        clean = [clean_s(status, seat, end_s) for seat in drive.seats]
+        for rider, seat, without_s in zip(self.riders, drive.seats, clean, strict=True):
+            own = {**told, **outcome_of(status, seat, end_s), **rider.quality()}
+            if isinstance(what, PracticeDrives):
+                rider.session.practised(min(clean) >= what.practice.seconds, **own,
+                                        clean_s=without_s)
+            else:
+                if hold:
+                    rider.session.hold(True)
+                rider.session.finish(**own)
 
     async def _break_off(self, item: SessionItem, reason: str | None) -> None:
         """End a run that does not count: it was aborted, or its item was skipped."""
         director = self._directs()
-        self._session.abort(reason or 'the session went on with something else', item.id)
+        self._abort_all(item.id, reason or 'the session went on with something else')
         self._set_phase(DrivePhase.PREPARING, item.id, work=DriveWork.STOPPED)
         if director.status.run != 'ended':
             await director.stop()
@@ -301,9 +295,9 @@ class LiveDrives:
         graph, words = self._graph, 'it was killed'
         if graph is not None and not graph.was_killed:
             words = graph.last_words()
-        item = self._state.item
+        item = self._item
         if self._is_under_way:
-            self._session.abort(f'the simulation ended by itself: {words}', item)
+            self._abort_all(item, f'the simulation ended by itself: {words}')
         self._set_phase(DrivePhase.PREPARING, item, words, work=DriveWork.RESTARTING)
         await self.close()
         self._set_phase(DrivePhase.PREPARING, item, words, work=DriveWork.RESTARTING)
@@ -320,7 +314,7 @@ class LiveDrives:
             await self._lose()
             return
         if self._is_under_way:
-            self._session.abort(text, item.id)
+            self._abort_all(item.id, text)
         self._loaded = None
         self._set_phase(DrivePhase.FAILED, item.id, text)
         await self._wait()
@@ -357,19 +351,28 @@ class LiveDrives:
     def _set_phase(self, phase: DrivePhase, item: str = '', text: str = '', *,
                    work: DriveWork = DriveWork.NONE, attempt: int = 0,
                    drive: StudyDrive | None = None) -> None:
-        link = watch = ''
-        if drive is not None and self._graph is not None:
-            page, watched = self._links or (self._graph.cockpit, self._graph.cockpit)
-            link = drive.link(page, self._language(), self._key)
-            watch = drive.watch_link(watched)
-        state = DriveState(phase, item, attempt, link, watch, None, work, text)
-        if state != self._state:
-            self._state = state
-            self._tell()
+        self._phase, self._item = phase, item
+        links = self._links_to(drive)
+        for rider, (link, watch, confederate) in zip(self.riders, links, strict=True):
+            # The page may load its frame while the participant still answers.
+            mine = DrivePhase.NONE if phase is DrivePhase.READY and not rider.is_due(item) \
+                else phase
+            rider.enter(DriveState(
+                mine, item, attempt, link, watch, None, work, text, confederate=confederate,
+                awaits_others=mine is DrivePhase.READY and rider.is_ready))
 
-    def _tell(self) -> None:
-        for changed in self._changed:
-            changed()
+    def _links_to(self, drive: StudyDrive | None) -> list[tuple[str, str, str]]:
+        """Return each participant's links: to drive, to watch, and for the experimenter's seat."""
+        if drive is None or self._graph is None:
+            return [('', '', '') for _ in self.riders]
+        watched, experimenters, *pages = self._links or (
+            self._graph.cockpit,) * (2 + len(self.riders))
+        other, study = drive.settings.confederate, self.riders[0].session.study
+        confederate = '' if other is None else drive.link(
+            experimenters, other, study.language, self._key)
+        return [(drive.link(page, seat, rider.session.page_language, rider.key),
+                 drive.watch_link(watched, seat), confederate)
+                for page, seat, rider in zip(pages, drive.seats, self.riders, strict=True)]
 
 
 def _is_closed(folder: Path) -> bool:

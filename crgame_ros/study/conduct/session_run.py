@@ -3,7 +3,7 @@
 """Conducts a participant's session: pages, drives, and an orderly end."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
 import math
@@ -11,6 +11,7 @@ from pathlib import Path
 import signal
 from urllib.parse import urlsplit
 
+from aiohttp import web
 from crgame_ros.cockpit.exposure import Exposure
 from crgame_ros.software import software_with_commit
 from crgame_ros.study.conduct.live_drives import LiveDrives
@@ -29,12 +30,11 @@ LINGER_S = 5.0
 @dataclass(frozen=True)
 class SessionRequest:
     """
-    The session to conduct.
+    The session to conduct: of one participant, or of those who drive together.
 
     :param study: its study.
-    :param folder: of the participant.
-    :param participant: anonymous id.
-    :param port: of the pages; the cockpit takes a later one.
+    :param folders: of the participants, by their anonymous ids, in the order of their seats.
+    :param port: of the first pages; others and the cockpit take later ones.
     :param place: among all participants, from 0 on; by default the next free one.
     :param group: that the experimenter gives.
     :param listen: address at which other machines get the pages, by links over TLS; None serves
@@ -45,8 +45,7 @@ class SessionRequest:
     """
 
     study: StudyFile
-    folder: Path
-    participant: str
+    folders: Mapping[str, Path]
     port: int
     place: int | None = None
     group: str | None = None
@@ -55,13 +54,19 @@ class SessionRequest:
     key: Path | None = None
     absent_s: float = math.inf
 
-    def exposure(self, private: Path) -> Exposure:
+    @property
+    def names(self) -> str:
+        """Return the ids of the participants in one text."""
+        return ' and '.join(self.folders)
+
+    def exposure(self, private: Path, number: int = 0) -> Exposure:
         """
-        Return how the pages are served.
+        Return how a participant's pages are served.
 
         :param private: folder of links and certificate.
+        :param number: of the participant, from 0 on.
         """
-        return Exposure(self.listen or HOST, self.port, links=self.listen is not None,
+        return Exposure(self.listen or HOST, self.port + number, links=self.listen is not None,
                         certificate=self.certificate, key=self.key, private=private)
 
 
@@ -71,48 +76,74 @@ def conduct(request: SessionRequest, say: Callable[[str], None]) -> bool:
 
     :param say: prints one line.
     :return: whether the session is over.
-    :raises CrgameError: if it cannot begin, or another process has the participant's session.
+    :raises CrgameError: if it cannot begin, or another process has a participant's session.
     """
-    with ParticipantSession(request.study, request.folder, request.participant,
-                            request.place, group=request.group) as session:
-        say(f'{request.participant}, place {session.place + 1} of {request.study.name}; data go '
-            f'to {request.folder}')
-        if session.next_item is None:
-            say(f'{request.participant} is done: nothing is left')
+    with contextlib.ExitStack() as opened:
+        sessions: list[ParticipantSession] = []
+        for participant, folder in request.folders.items():
+            # Those who drive together have the same orders.
+            session = opened.enter_context(ParticipantSession(
+                request.study, folder, participant,
+                sessions[0].place if sessions else request.place, group=request.group,
+                members=tuple(request.folders) if len(request.folders) > 1 else ()))
+            sessions.append(session)
+            say(f'{participant}, place {session.place + 1} of {request.study.name}; data go '
+                f'to {folder}')
+        first, *partners = sessions
+        if partners:
+            first.join(partners)
+        if _are_over(sessions):
+            say(f'{request.names} {_is(sessions)} done: nothing is left')
             return True
-        session.note_software(software_with_commit())
-        asyncio.run(_conduct(session, request, say))
-        return session.next_item is None
+        for session in sessions:
+            session.note_software(software_with_commit())
+        asyncio.run(_conduct(sessions, request, say))
+        return _are_over(sessions)
 
 
-async def _conduct(session: ParticipantSession, request: SessionRequest,
+def _are_over(sessions: Sequence[ParticipantSession]) -> bool:
+    return all(session.next_item is None for session in sessions)
+
+
+def _is(people: Sequence[object]) -> str:
+    return 'is' if len(people) == 1 else 'are'
+
+
+async def _conduct(sessions: Sequence[ParticipantSession], request: SessionRequest,
                    say: Callable[[str], None]) -> None:
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         loop.add_signal_handler(number, stop.set)
-    origin: list[str] = []
-    private = request.folder / '.private'
-    private.mkdir(parents=True, exist_ok=True, mode=0o700)
-    exposure = request.exposure(private)
-    pair = exposure.pair()
+    origins: list[str] = []
+    private = [folder / '.private' for folder in request.folders.values()]
+    for path in private:
+        path.mkdir(parents=True, exist_ok=True, mode=0o700)
+    exposures = [request.exposure(path, number) for number, path in enumerate(private)]
+    pair = exposures[0].pair()
     opened = [] if pair is None else [
-        '--open-cockpit', '--listen', exposure.host, '--certificate', str(pair[0]),
+        '--open-cockpit', '--listen', exposures[0].host, '--certificate', str(pair[0]),
         '--key', str(pair[1])]
-    drives = LiveDrives(session, request.folder, lambda: desk.language, request.port + 1,
-                        lambda: ['--countdown', str(COUNTDOWN_S), *opened, '--framed-by', *origin],
-                        None if pair is None else pair[0])
-    desk = Desk(session, drives)
-    runner, lines = await serve_desk(desk, exposure.access(), private)
+    drives = LiveDrives(
+        sessions, next(iter(request.folders.values())), request.port + len(sessions),
+        lambda: ['--countdown', str(COUNTDOWN_S), *opened,
+                 *(f'--framed-by={origin}' for origin in origins)],
+        None if pair is None else pair[0])
+    desks = [Desk(rider.session, rider) for rider in drives.riders]
+    runners: list[web.AppRunner] = []
     driving: asyncio.Task[None] | None = None
     try:
-        for line in (*lines, *exposure.certificate_lines()):
-            say(line)
-        address = urlsplit(lines[0].split()[-1])
-        origin.append(f'{address.scheme}://{address.netloc}')
+        for desk, exposure, path in zip(desks, exposures, private, strict=True):
+            runner, lines = await serve_desk(desk, exposure.access(), path)
+            runners.append(runner)
+            for line in (*lines, *exposure.certificate_lines()):
+                say(line if len(desks) == 1 else f'{desk.session.participant}: {line}')
+            address = urlsplit(lines[0].split()[-1])
+            origins.append(f'{address.scheme}://{address.netloc}')
         driving = asyncio.create_task(drives.run())
-        if not await _until_over(desk, driving, stop, request.absent_s):
-            say(f'no page of {request.participant} for {request.absent_s / 60.0:g} min')
+        absent = await _until_over(desks, driving, stop, request.absent_s)
+        if absent:
+            say(f'no page of {absent} for {request.absent_s / 60.0:g} min')
     finally:
         if driving is not None:
             driving.cancel()
@@ -120,28 +151,33 @@ async def _conduct(session: ParticipantSession, request: SessionRequest,
                 await driving
         say('ending: recordings are finished')
         await drives.close()
-        await runner.cleanup()
+        for runner in runners:
+            await runner.cleanup()
 
 
-async def _until_over(desk: Desk, driving: asyncio.Task[None], stop: asyncio.Event,
-                      absent_s: float) -> bool:
+async def _until_over(desks: Sequence[Desk], driving: asyncio.Task[None], stop: asyncio.Event,
+                      absent_s: float) -> str:
     """
     Wait for the last item, or for the end of the program.
 
     :param absent_s: do not wait any longer for a participant whose page is silent [s].
-    :return: whether the participant was there.
+    :return: the id of that participant; empty if all were there.
     """
     stopped = asyncio.create_task(stop.wait())
     try:
-        while not stop.is_set() and desk.session.next_item is not None:
-            if desk.clock_s() - desk.heard_s > absent_s:
-                return False
+        while not stop.is_set():
+            under_way = [desk for desk in desks if desk.session.next_item is not None]
+            if not under_way:
+                break
+            for desk in under_way:
+                if desk.clock_s() - desk.heard_s > absent_s:
+                    return desk.session.participant
             if driving.done() and driving.exception() is not None:
                 # An error that no page can fix.
                 driving.result()
             await asyncio.sleep(0.1)
         if not stop.is_set():
             await asyncio.wait([stopped], timeout=LINGER_S)
-        return True
+        return ''
     finally:
         stopped.cancel()

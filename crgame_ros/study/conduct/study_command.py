@@ -24,6 +24,7 @@ Plan an experiment with people: who drives which trials in which order, and what
   crgame study preregister my_study/study.yaml   # the plan as one document with a hash
   crgame study run my_study/study.yaml --participant P01
   crgame study run my_study/study.yaml --participant P02 --listen sim.example.org   # elsewhere
+  crgame study run my_study/study.yaml --participant P03,P04   # who drive together
   crgame study serve my_study/study.yaml --listen sim.example.org   # whom a platform sends
   crgame study data studies/my_study      # tables of what it has found so far
   crgame study report studies/my_study    # the same for people, one HTML file
@@ -44,7 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     run = what.add_parser('run', help='lead a participant through a session')
     run.add_argument('file', type=Path, help='study file')
     run.add_argument('--participant', required=True, metavar='ID',
-                     help='anonymous id, such as P07; a session that has begun is continued')
+                     help='anonymous id, such as P07; of those who drive together P07,P08, in the '
+                     'order of "seats"; a session that has begun is continued')
     run.add_argument('--out', type=Path, metavar='DIR',
                      help="folder of the study's data (default: studies/NAME)")
     run.add_argument('--place', type=int, metavar='N',
@@ -105,9 +107,6 @@ def _check_opening(values: argparse.Namespace) -> None:
     from crgame_ros.cockpit.exposure import check_certificate
     if not 1 <= values.port <= 65_000:
         raise InputError(f'is {values.port}', '--port', 'give 1 to 65000')
-    if (values.certificate is None) != (values.key is None):
-        raise InputError('a certificate and its key belong together', '--certificate',
-                         'give --certificate and --key')
     if values.listen is None:
         if values.certificate is not None:
             raise InputError('is of no use on this machine alone', '--certificate',
@@ -151,6 +150,7 @@ def check_command(values: argparse.Namespace) -> int:
     from crgame_ros.study.conduct.plan_commands import check_planned_measures
     from crgame_ros.study.data.study_data_command import told_overdue
     from crgame_ros.study.file import load_study
+    from crgame_ros.study.session_script import members_of
     from crgame_ros.study.trial_plan import orders_of, told_trials
     if not 0 <= values.participants <= 10_000:
         raise InputError(f'is {values.participants}', '--participants', 'give 0 to 10000')
@@ -164,13 +164,15 @@ def check_command(values: argparse.Namespace) -> int:
         say(f'{finding.kind}: {finding.text}')
     if any(finding.kind == 'error' for finding in findings):
         return 1
+    members = members_of(study)
     if study.groups is not None:
         print(f'groups by {study.groups.name}: {study.groups.told}')
     for block in study.blocks:
         if block.staircase is not None:
             print(f'block {block.name}: {block.staircase.told}')
     for group, place, trials in orders_of(study, values.participants):
-        print(f'{group}, place {place + 1}:' if group else f'participant {place + 1}:')
+        print(f'{group}, place {place + 1}:' if group
+              else f'{"participant" if members == 1 else "place"} {place + 1}:')
         for number, block_name, what in told_trials(trials):
             print(f'  {number:>3}  {block_name}  {what}')
     length = length_of(study)
@@ -190,6 +192,7 @@ def run_command(values: argparse.Namespace) -> int:
     from crgame_ros.study.desk.page_markdown import pictures_of
     from crgame_ros.study.file import load_study
     from crgame_ros.study.folder import check_participant, StudyFolder
+    from crgame_ros.study.session_script import members_of
     require_ros()
     prepare_environment()
     from crgame_ros.launcher.interruption import print_now
@@ -199,7 +202,7 @@ def run_command(values: argparse.Namespace) -> int:
     os.environ.pop(PARENT_VARIABLE, None)
     from crgame_ros.study.conduct.session_run import conduct, SessionRequest
     study = load_study(values.file)
-    participant = check_participant(values.participant)
+    participants = [check_participant(name) for name in values.participant.split(',')]
     _check_opening(values)
     if not values.absent > 0.0:
         raise InputError(f'is {values.absent:g}', '--absent', 'give minutes above 0')
@@ -208,15 +211,23 @@ def run_command(values: argparse.Namespace) -> int:
     if values.place is not None and study.groups is not None:
         raise InputError(f'is {values.place}, but the group decides on the place', '--place',
                          'leave it out')
+    members = members_of(study)
+    if len(set(participants)) != members or len(participants) != members:
+        raise InputError(f'is {values.participant}', '--participant',
+                         'name one participant' if members == 1 else
+                         f'name the {members} who drive together, such as P07,P08')
     folder = StudyFolder(values.out or Path('studies') / study.name)
-    folder.begin(participant)
+    for participant in participants:
+        folder.begin(participant)
     folder.keep_study(study, values.file, pictures_of(study))
-    over = conduct(SessionRequest(
-        study, folder.participant(participant).resolve(), participant, values.port,
+    request = SessionRequest(
+        study, {name: folder.participant(name).resolve() for name in participants}, values.port,
         None if values.place is None else values.place - 1, values.group, values.listen,
-        values.certificate, values.key, 60.0 * values.absent), print_now)
-    print_now(f'{participant} is done' if over
-              else f'{participant} goes on with the same command')
+        values.certificate, values.key, 60.0 * values.absent)
+    over = conduct(request, print_now)
+    one = members == 1
+    print_now(f'{request.names} {"is" if one else "are"} done' if over
+              else f'{request.names} {"goes" if one else "go"} on with the same command')
     return 0
 
 

@@ -12,9 +12,8 @@ from urllib.parse import urlencode
 
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.driver.source import COCKPIT
-from crgame_ros.study.session_script import PracticeDrives, SessionItem
-from crgame_ros.study.trial_game import seat_of, trial_game
-from crgame_ros.study.trial_plan import PlannedTrial
+from crgame_ros.study.session_script import SessionItem, settings_of
+from crgame_ros.study.trial_game import seats_of, trial_game
 from crgame_ros.study.trial_settings import TrialSettings
 from crgame_ros.whole_file import write_whole
 
@@ -109,13 +108,6 @@ class Disturbance:
         return None
 
 
-def settings_of(item: SessionItem) -> TrialSettings | None:
-    """Return the settings of an item that is driven; None for others."""
-    if isinstance(item.what, PlannedTrial):
-        return item.what.condition.settings
-    return item.what.settings if isinstance(item.what, PracticeDrives) else None
-
-
 @dataclass(frozen=True)
 class StudyDrive:
     """
@@ -123,20 +115,21 @@ class StudyDrive:
 
     :param item: of the session.
     :param settings: of the item.
-    :param seat: the vehicle that the participant drives.
+    :param seats: the vehicles that the participants drive, in their order.
     :param game: file of its game.
     """
 
     item: SessionItem
     settings: TrialSettings
-    seat: str
+    seats: tuple[str, ...]
     game: Path
 
-    def link(self, cockpit: str, language: str, key: str) -> str:
+    def link(self, cockpit: str, seat: str, language: str, key: str) -> str:
         """
-        Return the address of the participant's cockpit page.
+        Return the address of a cockpit page to drive.
 
-        :param key: by which the cockpit recognises the participant in any browser.
+        :param seat: of its driver.
+        :param key: by which the cockpit recognises the driver in any browser.
         """
         settings = self.settings
         shown = {name: int(bool(getattr(settings, name)))
@@ -144,13 +137,14 @@ class StudyDrive:
         labels = {name: settings.label_of(name, language) for name in settings.labels or {}}
         told = {'labels': json.dumps(labels, ensure_ascii=False)} if labels else {}
         return _with_query(cockpit, {
-            'stage': self.seat, 'view': settings.view or 'driver', **shown,
+            'stage': seat, 'view': settings.view or 'driver', **shown,
             **({} if settings.photodiode is None else {'corner': settings.photodiode}),
             'lang': language, **told, 'key': key})
 
-    def watch_link(self, cockpit: str) -> str:
-        """Return the address of a page that only shows the drive."""
-        return _with_query(cockpit, {'view': 'chase', 'vehicle': self.seat})
+    @staticmethod
+    def watch_link(cockpit: str, seat: str) -> str:
+        """Return the address of a page that only shows a vehicle in the drive."""
+        return _with_query(cockpit, {'view': 'chase', 'vehicle': seat})
 
 
 def _with_query(address: str, values: Mapping[str, object]) -> str:
@@ -175,4 +169,4 @@ def write_drive(item: SessionItem, games: Path) -> StudyDrive | None:
     text = game.dump()
     games.mkdir(parents=True, exist_ok=True)
     write_whole(text.encode(), path)
-    return StudyDrive(item, settings, seat_of(settings, game), path)
+    return StudyDrive(item, settings, seats_of(settings, game), path)

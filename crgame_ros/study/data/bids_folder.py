@@ -59,9 +59,10 @@ def write_bids(data: StudyData, out: Path) -> None:
     labels = _labels(data.records)
     task = _label(data.folder.study.name) or 'study'
     prepare_folder(out)
+    title = data.folder.study.title.in_language(data.folder.study.language) \
+        or data.folder.study.name
     _json(out / 'dataset_description.json', {
-        'Name': data.folder.study.title.in_language(data.folder.study.language)
-        or data.folder.study.name, 'BIDSVersion': VERSION, 'DatasetType': 'raw',
+        'Name': title, 'BIDSVersion': VERSION, 'DatasetType': 'raw',
         'GeneratedBy': [{'Name': 'crgame_ros', 'Version': __version__}]})
     write_text('Events and participants of a study in the driving simulator crgame_ros. The '
                f'tables that these are made of are in the folder above.\n\n{ESCAPED}\n',
@@ -87,7 +88,9 @@ def write_bids(data: StudyData, out: Path) -> None:
         # Equal times stay in the order of the journal.
         rows.sort(key=lambda row: row[0])
         _tsv(folder / f'{name}.tsv', list(_EVENT_COLUMNS), rows)
-        _json(folder / f'{name}.json', _sidecar())
+        _json(folder / f'{name}.json', {
+            'TaskName': task, 'TaskDescription': title, 'StimulusPresentation': {
+                'SoftwareName': 'crgame_ros', 'SoftwareVersion': __version__}, **_sidecar()})
         for trial in trials:
             write_recordings(trial, folder, f'sub-{labels[record.id]}_task-{task}',
                              record.begun_at)

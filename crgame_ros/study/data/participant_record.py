@@ -87,6 +87,7 @@ class ParticipantRecord:
     :param items: of the session.
     :param entries: of the journal.
     :param allocation: to a group; None before it, and in a study without groups.
+    :param members: ids of those who drove together, in the order of their seats; else empty.
     :param tracks: of the staircases, by block and staircase.
     """
 
@@ -97,7 +98,13 @@ class ParticipantRecord:
     items: Mapping[str, SessionItem]
     entries: tuple[Mapping[str, Any], ...]
     allocation: Allocation | None = None
+    members: tuple[str, ...] = ()
     tracks: Mapping[tuple[str, str], Track] = field(default_factory=dict)
+
+    @property
+    def recordings(self) -> Path:
+        """Return the folder of the participant that has the recordings."""
+        return self.folder.parent / self.members[0] if self.members else self.folder
 
     @cached_property
     def attempts(self) -> tuple[TrialAttempt, ...]:
@@ -270,11 +277,11 @@ class ParticipantRecord:
             yield openly
 
     def _run(self, entry: Mapping[str, Any]) -> Path | None:
-        """Return the folder of a recording, if it is one of the participant's."""
+        """Return the folder of a recording, if it is one of those who drove together."""
         name = entry.get('run')
         if not name or '..' in Path(name).parts or Path(name).is_absolute():
             return None
-        return self.folder / name
+        return self.recordings / name
 
 
 def _ended(attempt: TrialAttempt, ending: Ending, entry: Mapping[str, Any] | None,
@@ -303,8 +310,8 @@ def read_participant(study: StudyFile, folder: Path) -> ParticipantRecord | None
         items = session_of(study, allocation.place, allocation.group) if fits else ()
         noted = allocated['items']
     else:
-        items = session_of(study, begun['place']) if study.groups is None \
-            else items_before_groups(study)
+        items = session_of(study, begun['place'], member=_member(begun)) \
+            if study.groups is None else items_before_groups(study)
         noted = begun['items']
     if [item.id for item in items] != noted:
         raise InputError('began with another plan than that of the study file', str(folder),
@@ -314,4 +321,10 @@ def read_participant(study: StudyFile, folder: Path) -> ParticipantRecord | None
     session = followed(study, place, group, items, entries)
     return ParticipantRecord(begun['participant'] or folder.name, begun['place'], folder, study,
                              {item.id: item for item in session.items}, entries, allocation,
-                             session.tracks)
+                             tuple(begun.get('members') or ()), session.tracks)
+
+
+def _member(begun: Mapping[str, Any]) -> int:
+    """Return the number of the participant among those who drove together."""
+    members = begun.get('members') or [begun['participant']]
+    return int(members.index(begun['participant']))

@@ -106,13 +106,15 @@ def _run_rows(attempt: TrialAttempt, run: RunTables,
               record: ParticipantRecord) -> Iterator[dict[str, object]]:
     start_s = drive_start_s(attempt)
     folder = None if attempt.folder is None else attempt.folder.relative_to(
-        record.folder).as_posix()
+        record.recordings).as_posix()
     of_trial = {'item': attempt.item, 'trial': attempt.trial.number, 'attempt': attempt.attempt,
                 'recording': folder}
     for event in run.table('events').to_pylist():
         yield of_trial | {'kind': GAME_EVENT, 'name': event['name'], 'text': event['label'],
                           'time_s': event['time_s'], 'wall_s': start_s + event['time_s']}
     for task in run.summary['tasks']:
+        if record.members and task['seat'] != attempt.trial.condition.settings.seat:
+            continue
         yield of_trial | {'kind': f'{task["kind"]}_{task["what"]}', 'name': task['name'],
                           'text': task['outcome'], 'time_s': task['onset_s'],
                           'duration_s': task['duration_s'],

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The data of a study so far, as tables that can be rewritten while it goes on."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import fcntl
 from pathlib import Path
@@ -43,6 +43,8 @@ _PARTICIPANT_COLUMNS = (
     Column('begun_s', NUMBER, 's', 'when the session began', variant=WALL),
     Column('ended', TEXT, '', 'when its last entry was made, ISO 8601, UTC'),
     Column('ended_s', NUMBER, 's', 'when its last entry was made', variant=WALL),
+    Column('drove_with', TEXT, '', 'ids of those who drove in the same runs, with + between them',
+           empty='nobody did'),
     Column('sessions', INTEGER, '1', 'how often the simulator was started for the participant'),
     Column('trials', INTEGER, '1', 'trials that count'),
     Column('trials_planned', INTEGER, '1', 'trials of the session'),
@@ -105,7 +107,9 @@ class ParticipantsTable:
                 if entry.get('run')}
         row = {'participant': record.id, 'place': record.place + 1, 'language': record.language,
                'begun': utc(record.begun_at), 'begun_s': record.begun_at,
-               'ended': utc(record.ended_at), 'ended_s': record.ended_at, 'sessions': len(runs),
+               'ended': utc(record.ended_at), 'ended_s': record.ended_at,
+               'drove_with': '+'.join(each for each in record.members if each != record.id)
+               or None, 'sessions': len(runs),
                'trials': len(record.counted), 'trials_planned': record.trials_planned,
                'complete': record.complete, **_consent(record),
                **_excluded(record), **self._stepped.values(record),
@@ -197,7 +201,7 @@ def _times(record: ParticipantRecord, answered: AnsweredItem) -> dict[str, objec
     folder = None if run is None else run.folder
     return {'shown_s': answered.told.get('shown_at'), 'taken_s': answered.told.get('taken_s'),
             'recording': None if folder is None
-            else folder.relative_to(record.folder).as_posix(),
+            else folder.relative_to(record.recordings).as_posix(),
             'run_end_s': None if run is None else run.says('end_time_s'),
             'run_ended_s': None if run is None else run.ended_at}
 
@@ -254,6 +258,14 @@ class CountedTrial:
     attempt: TrialAttempt
     run: RunTables | None
     row: dict[str, Any]
+
+
+def one_per_run(trials: Sequence[CountedTrial]) -> list[CountedTrial]:
+    """Return trials, but of those who drove together in one run the first alone."""
+    found: dict[object, CountedTrial] = {}
+    for trial in trials:
+        found.setdefault(id(trial) if trial.run is None else trial.run.key, trial)
+    return list(found.values())
 
 
 @dataclass
@@ -356,7 +368,7 @@ def _run(folder: ConductedStudy, record: ParticipantRecord, attempt: TrialAttemp
         return None, ''
     if attempt.folder is None:
         return None, 'the journal names no recording'
-    problem = finished_recording(attempt.folder, record.folder, say)
+    problem = finished_recording(attempt.folder, record.recordings, say)
     if problem:
         return None, problem
     try:
@@ -366,7 +378,7 @@ def _run(folder: ConductedStudy, record: ParticipantRecord, attempt: TrialAttemp
 
 
 def _name(record: ParticipantRecord, run: Path) -> str:
-    return f'{record.id}/{run.relative_to(record.folder).as_posix()}'
+    return f'{record.recordings.name}/{run.relative_to(record.recordings).as_posix()}'
 
 
 def _report(run: Path, name: str, say: Callable[[str], object],

@@ -21,7 +21,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.recording.export import prepare_folder
 from crgame_ros.study.analysis.r_script import r_script
 from crgame_ros.study.data.paper_section import provenance_of
-from crgame_ros.study.data.study_data import CountedTrial, StudyData
+from crgame_ros.study.data.study_data import CountedTrial, one_per_run, StudyData
 from crgame_ros.study.data.study_row_table import csv_of_table, parquet_of_table
 from crgame_ros.whole_file import whole_file, write_bytes, write_text
 from crgame_ros.yaml_text import read_text
@@ -48,7 +48,7 @@ def write_run_tables(trials: Sequence[CountedTrial], out: Path, study: str) -> d
     :raises InputError: if the folder cannot be written.
     """
     prepare_folder(out)
-    measured = [trial for trial in trials if trial.run is not None]
+    measured = [trial for trial in one_per_run(trials) if trial.run is not None]
     made_of = [[trial.record.id, trial.attempt.trial.number, trial.attempt.trial.condition.name,
                 trial.run.key] for trial in measured if trial.run is not None]
     earlier = _earlier(out, made_of)

@@ -17,7 +17,7 @@ from crgame_ros.recording.export import prepare_folder
 from crgame_ros.recording.run_cycles import replay_inputs
 from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.simulation.av_assignment import OWN
-from crgame_ros.study.data.study_data import CountedTrial, StudyData
+from crgame_ros.study.data.study_data import CountedTrial, one_per_run, StudyData
 from crgame_ros.study.data.study_row_table import csv_of_table, table_of_rows, with_unit
 from crgame_ros.study.data.trials_table import PARTICIPANT, TRIAL
 from crgame_ros.whole_file import write_bytes, write_text
@@ -82,7 +82,7 @@ def rerun_study(data: StudyData, planners: Sequence[str], out: Path, workers: in
     """
     from crgame_ros.evaluation.dask_cluster import require_dask
     require_dask()
-    trials = [trial for trial in data.trials if _can_be_repeated(trial, say)]
+    trials = [trial for trial in one_per_run(data.trials) if _can_be_repeated(trial, say)]
     if not trials:
         raise InputError('no trial of a person and an AV can be repeated', str(data.folder.path),
                          'run some first')

@@ -279,8 +279,9 @@ class TrialsTable:
                      if row['plans_of_others'] is not None]
         return {'run': told['run'], 'vehicle': vehicle, 'random_seed': told['seed'],
                 'av_planner': '+'.join(dict.fromkeys(summary['planners'].values())),
-                **task_values(run.table('detection_scores').to_pylist(),
-                              run.table('take_over_requests').to_pylist()),
+                **task_values(*([row for row in run.table(name).to_pylist()
+                                 if row['vehicle'] == vehicle]
+                                for name in ('detection_scores', 'take_over_requests'))),
                 'plans_of_others': sum(of_others) if of_others else None,
                 **_view(summary.get('views', {}).get(vehicle, ())),
                 'input_delay_s': _seconds(summary['input_delay_ms'].get(vehicle)),

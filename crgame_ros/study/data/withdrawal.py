@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Deletes the data of a participant who withdraws, wherever a study's folder holds them."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from datetime import date
@@ -32,7 +32,7 @@ from crgame_ros.study.data.study_rerun import RERUN
 from crgame_ros.study.elsewhere import PRIVATE
 from crgame_ros.study.enrolment import read_enrolment
 from crgame_ros.study.folder import MADE, WITHDRAWALS, WITHDRAWING
-from crgame_ros.study.session_journal import JOURNAL
+from crgame_ros.study.session_journal import JOURNAL, read_journal, SessionEvent
 from crgame_ros.whole_file import sync_folder, write_text
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -104,9 +104,35 @@ class Withdrawal:
                              f'name a folder in {root / PARTICIPANTS}')
 
     def held(self) -> list[HeldData]:
-        """Return what is deleted: the participant's folder, then what was made of it."""
+        """
+        Return what is deleted: what was made of the participant's data, then the own folder.
+
+        Recordings of those who drove together have the data of all of them, wherever they are.
+        The journal, which says who they are, is deleted last.
+        """
         own = [path for path in (self._folder, self._pending / _MOVED) if path.exists()]
-        return [HeldData.of(path) for path in (*own, *self._derived())]
+        return [HeldData.of(path) for path in (*self._shared(own), *self._derived(), *own)]
+
+    def _shared(self, own: Sequence[Path]) -> Iterator[Path]:
+        """Yield recordings of the participant's drives in the folder of another one."""
+        first = self._together()[0]
+        if first == self.participant:
+            return
+        # A later run of a program is in the folder of its first one.
+        names = {Path(*Path(entry['run']).parts[:2]) for folder in own
+                 for entry in read_journal(folder) if entry.get('run')}
+        for name in sorted(names):
+            run = self.root / PARTICIPANTS / first / name
+            if '..' not in name.parts and run.is_dir():
+                yield run
+
+    def _together(self) -> list[str]:
+        """Return the ids of those who drove together, the owner of the recordings first."""
+        for folder in (self._folder, self._pending / _MOVED):
+            for entry in read_journal(folder):
+                if entry['entry'] == SessionEvent.BEGUN and entry.get('members'):
+                    return list(map(str, entry['members']))
+        return [self.participant]
 
     def carry_out(self, today: date, say: Callable[[str], object]) -> list[Path]:
         """
@@ -185,7 +211,7 @@ class Withdrawal:
             if (data / name).exists():
                 yield data / name
         for entry in sorted((data / KEPT).iterdir()) if (data / KEPT).is_dir() else ():
-            if not _is_of_others(entry, self.participant):
+            if not _is_of_others(entry, self._together()):
                 yield entry
         rerun = data / RERUN
         if rerun.is_dir() and (not any(rerun.rglob(GRID_FILE)) or any(map(
@@ -203,7 +229,8 @@ class Withdrawal:
                 yield Path(folder) / GRID_FILE
 
     def _names_participant(self, grid: Path) -> bool:
-        return f'/{PARTICIPANTS}/{self.participant}/' in grid.read_text('utf-8', 'replace')
+        text = grid.read_text('utf-8', 'replace')
+        return any(f'/{PARTICIPANTS}/{name}/' in text for name in self._together())
 
     def _write_anew(self, what: list[str], say: Callable[[str], object]) -> None:
         if not what:
@@ -233,13 +260,14 @@ class Withdrawal:
                 *(path for path in sorted(data.iterdir()) if path.name not in names)]
 
 
-def _is_of_others(entry: Path, participant: str) -> bool:
-    """Return whether kept measures are surely those of another participant's run."""
+def _is_of_others(entry: Path, participants: Iterable[str]) -> bool:
+    """Return whether kept measures are surely those of other participants' runs."""
     try:
         runs = pq.read_table(entry / 'vehicles.parquet', columns=['run'])['run'].to_pylist()
     except (OSError, KeyError, pa.ArrowInvalid):
         return False
-    return bool(runs) and not any(run.startswith(f'{participant}/') for run in runs)
+    return bool(runs) and not any(run.startswith(f'{participant}/') for run in runs
+                                  for participant in participants)
 
 
 def _delete(path: Path) -> None:

@@ -16,8 +16,7 @@ from crgame_ros.study.file import Break, Page
 from crgame_ros.study.pages import consent_of
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_journal import DECLINED, SessionEvent
-from crgame_ros.study.session_script import PracticeDrives, SessionItem
-from crgame_ros.study.trial_plan import PlannedTrial
+from crgame_ros.study.session_script import is_driven
 
 
 class Drives(Protocol):
@@ -100,7 +99,7 @@ class Desk:
     @property
     def language(self) -> str:
         """Return the language of the participant's page."""
-        return self.session.language or self.session.study.language
+        return self.session.page_language
 
     @property
     def asks_language(self) -> bool:
@@ -299,8 +298,3 @@ class Desk:
                 changed()
             except CrgameError:
                 _log.exception('an observer of the desk')
-
-
-def is_driven(item: SessionItem) -> bool:
-    """Return whether an item consists of drives."""
-    return isinstance(item.what, PlannedTrial | PracticeDrives)

@@ -9,7 +9,7 @@ import math
 from typing import Any
 
 from crgame_ros.study.answer_condition import AnswerCondition, holds_for
-from crgame_ros.study.desk.desk import Desk, is_driven, UNDER_WAY
+from crgame_ros.study.desk.desk import Desk, UNDER_WAY
 from crgame_ros.study.desk.page_markdown import read_tree
 from crgame_ros.study.drive_state import DrivePhase
 from crgame_ros.study.file import Break, DeviceCheck, Page, Questions
@@ -27,7 +27,7 @@ from crgame_ros.study.question import (
 )
 from crgame_ros.study.questionnaire import load_questionnaire
 from crgame_ros.study.session_journal import DECLINED, SessionEvent
-from crgame_ros.study.session_script import Fields, PracticeDrives, SessionItem
+from crgame_ros.study.session_script import Fields, is_driven, PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 
 MOST_ENTRIES = 300
@@ -134,7 +134,8 @@ def _drive(desk: Desk, item: SessionItem) -> dict[str, Any]:
     if slow is not None:
         return {'show': 'wait', 'why': 'slow', 'link': asdict(slow)}
     drive = {'show': 'drive', 'phase': state.phase.value, 'link': state.link,
-             'attempt': state.attempt, 'practice': isinstance(what, PracticeDrives)}
+             'attempt': state.attempt, 'awaits_others': state.awaits_others,
+             'practice': isinstance(what, PracticeDrives)}
     if isinstance(what, PlannedTrial):
         # The last trials of a staircase may not be needed, and leave gaps in the numbers.
         drive['number'] = 1 + sum(isinstance(each.what, PlannedTrial)
@@ -210,13 +211,15 @@ def experimenter_document(desk: Desk, page: Mapping[str, object]) -> dict[str, o
         'study': session.study.title.in_language(session.study.language) or session.study.name,
         'name': session.study.name, 'participant': session.participant, 'place': session.place,
         'group': None if session.allocation is None else session.allocation.group,
+        'partners': [partner.participant for partner in session.partners],
         'language': session.language, 'page': dict(page), 'markers': list(session.study.markers),
         'item': '' if item is None else item.id, 'held': session.held_at is not None,
         'waits': desk.waits, 'ending': desk.ending,
         'over': how_over(desk) if item is None else '', 'can_abort': desk.can_abort,
         'drive': {'phase': state.phase.value, 'item': state.item, 'attempt': state.attempt,
                   'time_s': state.time_s, 'work': state.work.value, 'text': state.text,
-                  'doubts': list(map(_doubt, state.doubts)), 'watch': state.watch},
+                  'doubts': list(map(_doubt, state.doubts)), 'watch': state.watch,
+                  'confederate': state.confederate, 'awaits_others': state.awaits_others},
         'pause_h': _pause_h(session),
         'items': _items(desk), 'log': _log(desk)}
 

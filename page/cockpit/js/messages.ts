@@ -304,7 +304,7 @@ export interface HelloMessage {
   version: string;
   program?: string;
   rights: Rights;
-  framed_by?: string;
+  framed_by?: string; // origins, with spaces between them
   measures?: Measure[];
   exposures?: Exposure[];
 }

@@ -86,8 +86,8 @@ export class Store {
     may_drive: false };
   mode: HelloMessage['mode'] | null = null;
   version = '';
-  /** Origin of the one page that may frame this one; empty for none. */
-  framedBy = '';
+  /** Origins of the only pages that may frame this one. */
+  framedBy: string[] = [];
   connected = false;
   round_trip_ms = NaN;
   /** The clock of the server's machine. */
@@ -146,7 +146,7 @@ export class Store {
         this.me = { id: message.client, name: message.name };
         this.mode = message.mode;
         this.version = message.version;
-        this.framedBy = message.framed_by ?? '';
+        this.framedBy = (message.framed_by ?? '').split(' ').filter(Boolean);
         this.measures = message.measures ?? [];
         this.exposures = message.exposures ?? [];
         this.rights = message.rights ?? this.rights;

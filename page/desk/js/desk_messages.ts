@@ -97,6 +97,7 @@ export interface DriveDocument extends Always {
   phase: 'ready' | 'countdown' | 'driving' | 'ended';
   link: string;
   attempt: number;
+  awaits_others: boolean; // this participant is ready, those who drive too are not
   practice: boolean;
   number: number;
 }

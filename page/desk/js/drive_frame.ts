@@ -21,6 +21,8 @@ export class DriveFrame {
   #frame: HTMLIFrameElement | null = null;
   #link = '';
   #phase = '';
+  #pressed = false;
+  #awaitsOthers = false;
   #state: Partial<StageState> = {};
   #title = element('h2');
   #text = element('p', { class: 'lead' });
@@ -54,10 +56,12 @@ export class DriveFrame {
     this.#root.hidden = false;
     this.#load(shown.link);
     this.#phase = shown.phase;
+    this.#pressed &&= shown.phase === 'ready' && !entered;
+    this.#awaitsOthers = shown.awaits_others;
     setText(this.#title, titleOf(shown, shown.progress, this.#words));
     setText(this.#text, this.#words.of(
-      shown.phase === 'ended' ? 'ended_text' : shown.attempt > 1 && !shown.practice
-        ? 'again_text' : 'ready_text'));
+      shown.phase === 'ended' ? 'ended_text' : shown.awaits_others ? 'others_text'
+        : shown.attempt > 1 && !shown.practice ? 'again_text' : 'ready_text'));
     this.#showGate();
     if (entered && shown.phase === 'ready' && !this.#button.disabled) {
       this.#button.focus();
@@ -82,6 +86,8 @@ export class DriveFrame {
     setText(this.#button, this.#words.of('ready'));
     setText(this.#status, ready && !loaded ? this.#words.of('loading') : '');
     setAttribute(this.#button, 'disabled', !loaded);
+    // After a reload the stage has to be told again.
+    this.#button.hidden = this.#pressed && this.#awaitsOthers;
     if (this.#frame) {
       this.#frame.inert = ready;
       // Before it has a seat and its first picture, the stage shows parts of an incomplete page.
@@ -96,6 +102,7 @@ export class DriveFrame {
     if (this.#phase !== 'ready') {
       return;
     }
+    this.#pressed = true;
     this.#ready();
     this.#post({ kind: 'calibrations', profiles: calibrations() });
     this.#post({ kind: 'ready', ready: true });

@@ -168,12 +168,14 @@ class ExperimenterPage {
     if (shown === null || this.#language === '') {
       return;
     }
-    const { study, participant, place, group, language } = shown;
+    const { study, participant, place, group, partners, language } = shown;
     document.title = this.#words.of('desk_title', { participant, study });
     setText(part(document.body, 'study'), study);
     setText(part(document.body, 'who'), [
       this.#words.of('desk_who', { participant, place: place + 1 }),
       ...group ? [this.#words.of('desk_group', { group })] : [],
+      ...partners.length === 0 ? []
+        : [this.#words.of('desk_partners', { partners: partners.join(', ') })],
       ...language ? [this.#words.of('desk_participant_language', { language })] : []].join(', '));
     this.#showPage(shown);
     this.#showNow(shown);
@@ -215,6 +217,7 @@ class ExperimenterPage {
         ...drive.time_s === null ? []
           : [words.of('desk_seconds', { seconds: words.number(drive.time_s, 1) })],
         ...drive.attempt > 1 ? [words.of('desk_attempt', { attempt: drive.attempt })] : [],
+        ...drive.awaits_others ? [words.of('desk_awaits_others')] : [],
       ].join(', '));
     }
     const work = drive.work ? words.of(`work_${drive.work}`) : '';
@@ -243,7 +246,7 @@ class ExperimenterPage {
     setAttribute(this.#orders.end, 'disabled', Boolean(over || shown.ending));
   }
 
-  /** Show the drive in a small frame while it is opened; closed, it costs nothing. */
+  /** Show the drive in a small frame while it is opened, and where the experimenter drives. */
   #showDrive() {
     const node = part(document.body, 'watch') as HTMLDetailsElement;
     const link = stageAddress(this.#shown?.drive.watch ?? '', window.location)?.href ?? '';
@@ -257,6 +260,10 @@ class ExperimenterPage {
       }
     }
     node.querySelector('iframe')?.setAttribute('title', this.#words.of('desk_watch_frame'));
+    const own = part(document.body, 'confederate') as HTMLAnchorElement;
+    const address = stageAddress(this.#shown?.drive.confederate ?? '', window.location);
+    own.hidden = address === null;
+    own.href = address?.href ?? '';
   }
 
   #showMarkers(markers: string[]) {

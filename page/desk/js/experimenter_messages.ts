@@ -49,6 +49,8 @@ export interface DriveNow {
   text: string; // a failure, in the words of the program that failed
   doubts: Doubt[]; // what of its data is beyond a bound of the study
   watch: string; // address of a page that shows the drive; empty for none
+  confederate: string; // of the view of an experimenter who drives too; likewise
+  awaits_others: boolean; // the participant is ready, those who drive too are not
 }
 
 export type LogEntry = { entry: string; at: number; [name: string]: unknown }; // of the journal
@@ -61,6 +63,7 @@ export interface ExperimenterDocument {
   participant: string;
   place: number;
   group: string | null;
+  partners: string[]; // ids of those who drive together with the participant
   language: string | null;
   page: ParticipantPage;
   markers: string[];

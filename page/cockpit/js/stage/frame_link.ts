@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The link between a stage and the page that frames it: one origin, set by the server. */
+/** The link between a stage and the page that frames it, of an origin set by the server. */
 
 import type { StageOrder, StageState } from './stage_messages.js';
 import type { Store } from '../store.js';
@@ -9,16 +9,18 @@ import type { Store } from '../store.js';
 export class FrameLink {
   #store;
   #told = '';
+  #heard = '';
 
   /**
-   * @param store whose `framedBy` is the origin
+   * @param store whose `framedBy` has the origins
    * @param ordered called for each order of that page
    */
   constructor(store: Store, ordered: (order: StageOrder) => void) {
     this.#store = store;
     window.addEventListener('message', ({ source, origin, data }) => {
       if (source === window.parent && window.parent !== window && origin !== ''
-          && origin === store.framedBy && isOrder(data)) {
+          && store.framedBy.includes(origin) && isOrder(data)) {
+        this.#heard = origin;
         ordered(data);
       }
     });
@@ -28,9 +30,12 @@ export class FrameLink {
   send(state: StageState) {
     const { framedBy } = this.#store;
     const text = JSON.stringify(state);
-    if (window.parent !== window && framedBy !== '' && text !== this.#told) {
+    if (window.parent !== window && framedBy.length > 0 && text !== this.#told) {
       this.#told = text;
-      window.parent.postMessage({ crgame: 1, kind: 'stage', state }, framedBy);
+      // The browser gives it only to a page of the named origin.
+      for (const origin of this.#heard === '' ? framedBy : [this.#heard]) {
+        window.parent.postMessage({ crgame: 1, kind: 'stage', state }, origin);
+      }
     }
   }
 }
