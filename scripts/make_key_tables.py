@@ -94,7 +94,7 @@ def held(hint: Any) -> Iterator[Any]:
     """Yield the dataclasses that a type is made of."""
     kind, marks = split(hint)
     for choice in () if mark_of(marks, Special) else choices_of(kind):
-        if is_dataclass(choice):
+        if isinstance(choice, type) and is_dataclass(choice):
             yield choice
         else:
             for inner in get_args(choice):

@@ -1,24 +1,28 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Write the columns of the tables that `crgame export` makes into docs/tables.md.
+Write the columns of tables into the documentation.
+
+Those that `crgame export` makes stand in docs/tables.md, those of staircases in docs/studies.md.
 
     python3 scripts/make_table_docs.py            write them
     python3 scripts/make_table_docs.py --check    say whether they are up to date, change nothing
 
-They stand between two comments: <!-- columns: begin --> and <!-- columns: end -->.
+They stand between two comments: <!-- columns: begin --> and <!-- columns: end -->; of staircases
+<!-- columns of staircases: begin --> and so on.
 """
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 import re
 import sys
 
 from crgame_ros.analysis.tables.column import Column, TableDeclaration
 from crgame_ros.analysis.tables.run_tables import TABLES
+from crgame_ros.study.data.staircases_table import STAIRCASES
 
-DOCUMENT = Path(__file__).resolve().parent.parent / 'docs' / 'tables.md'
-_COLUMNS = re.compile(r'(<!-- columns: begin -->\n).*?(<!-- columns: end -->)', re.DOTALL)
+DOCS = Path(__file__).resolve().parent.parent / 'docs'
 
 
 def table(declaration: TableDeclaration) -> str:
@@ -38,25 +42,47 @@ def _row(column: Column) -> str:
     return '| ' + ' | '.join(cell.replace('|', r'\|') for cell in cells) + ' |'
 
 
+def columns_of_runs() -> str:
+    """Describe the tables that `crgame export` makes."""
+    return '\n'.join(table(declaration) for declaration in TABLES)
+
+
+def columns_of_staircases() -> str:
+    """Describe the table of staircases, without a heading."""
+    return table(STAIRCASES).partition('\n\n')[2]
+
+
+PARTS: tuple[tuple[str, str, Callable[[], str]], ...] = (
+    ('tables.md', 'columns', columns_of_runs),
+    ('studies.md', 'columns of staircases', columns_of_staircases))
+
+
+def written(document: Path, words: str, columns: str, check: bool) -> bool:
+    """Write a part of a document, or check it; return whether it is as it should be."""
+    text = document.read_text(encoding='utf-8')
+    wanted, found = re.subn(
+        f'(<!-- {words}: begin -->\n).*?(<!-- {words}: end -->)',
+        lambda match: f'{match[1]}\n{columns}\n{match[2]}', text, flags=re.DOTALL)
+    if found != 1:
+        print(f'{document}: the comments "{words}: begin" and "{words}: end" are missing')
+        return False
+    if wanted == text:
+        return True
+    if check:
+        print(f'{document} is out of date: run scripts/make_table_docs.py')
+        return False
+    document.write_text(wanted, encoding='utf-8')
+    return True
+
+
 def main() -> int:
-    """Write the document, or check it."""
+    """Write the documents, or check them."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--check', action='store_true', help='change nothing')
     values = parser.parse_args()
-    text = DOCUMENT.read_text(encoding='utf-8')
-    columns = '\n'.join(table(declaration) for declaration in TABLES)
-    wanted, found = _COLUMNS.subn(lambda match: match[1] + '\n' + columns + '\n' + match[2], text)
-    if found != 1:
-        print(f'{DOCUMENT}: the comments "columns: begin" and "columns: end" are missing')
-        return 1
-    if wanted == text:
-        return 0
-    if values.check:
-        print(f'{DOCUMENT} is out of date: run scripts/make_table_docs.py')
-        return 1
-    DOCUMENT.write_text(wanted, encoding='utf-8')
-    return 0
+    done = [written(DOCS / name, words, columns(), values.check) for name, words, columns in PARTS]
+    return int(not all(done))
 
 
 if __name__ == '__main__':

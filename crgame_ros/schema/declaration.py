@@ -155,9 +155,10 @@ def known_keys(kind: type[object]) -> tuple[str, ...]:
 
 
 def sentences_of(kind: type[object]) -> dict[str, str]:
-    """Return the description of each field from the docstring of a class, in one line each."""
-    text = inspect.cleandoc(kind.__doc__ or '')
-    return {name: ' '.join(words.split()).rstrip('.') for name, words in _PARAM.findall(text)}
+    """Return the description of each field from the docstrings of a class, in one line each."""
+    return {name: ' '.join(words.split()).rstrip('.')
+            for base in reversed(kind.__mro__)
+            for name, words in _PARAM.findall(inspect.cleandoc(base.__doc__ or ''))}
 
 
 @functools.cache
@@ -193,7 +194,8 @@ def wanted(hint: object, marks: tuple[object, ...] = ()) -> str:
     if special is not None:
         return str(special)
     wording = mark_of(marks, Wording)
-    words = [_wanted(choice, marks) for choice in choices_of(hint) if choice is not types.NoneType]
+    words = [_wanted(plain, (*marks, *inner)) for choice in choices_of(hint)
+             if choice is not types.NoneType for plain, inner in (split(choice),)]
     text = wording.remedy.removeprefix('give ') if wording else ' or '.join(dict.fromkeys(words))
     others = [str(mark.written) for mark in marks
               if isinstance(mark, Meaning) and isinstance(mark.written, str)]

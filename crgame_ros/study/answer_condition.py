@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Conditions on answers: whether a question is asked, and whether a participant is excluded."""
+"""Conditions on answers: whether a question is asked, a participant excluded, a trial good."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,35 +15,23 @@ _SEE = 'see docs/studies.md for the keys'
 
 
 @dataclass(frozen=True)
-class AnswerCondition:
+class AnswerTest:
     """
-    A condition on an answer; it does not hold without an answer.
+    Tests of an answer, or of another value; they do not hold without one.
 
-    :param question: name of the question.
-    :param questionnaire: name of its questionnaire, for `exclude`; otherwise it is the same one.
-    :param field: name of a field of the participant, instead of a question.
     :param equals: the answer; of several choices, one that is chosen.
     :param one_of: answers, of which it is one.
     :param at_least: least number.
     :param below: the number is less than this.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
-
-    question: ColumnName | None = None
-    questionnaire: ColumnName | None = None
-    field: ColumnName | None = None
     equals: object = None
     one_of: Annotated[tuple[object, ...], Listed(noun='answer')] = ()
     at_least: float | None = None
     below: float | None = None
 
     def check(self) -> None:
-        """Refuse a condition on nothing, on two things, or without a test."""
-        if (self.question is None) == (self.field is None):
-            raise InputError('has not one of "question" and "field"', '', 'give exactly one')
-        if self.questionnaire is not None and self.question is None:
-            raise InputError('has "questionnaire" without "question"', '', 'give both')
+        """Refuse what tests nothing, and two lists of answers."""
         if self.equals is None and not self.one_of and self.at_least is None \
                 and self.below is None:
             raise InputError('tests nothing', '', 'give equals, one_of, at_least or below')
@@ -67,15 +55,43 @@ class AnswerCondition:
                 return False
         return not self.values or is_one_of(answer, self.values)
 
-    def text(self) -> str:
-        """Return the condition in words."""
-        what = self.field or (f'{self.questionnaire}.' if self.questionnaire else '') \
-            + str(self.question)
+    def text_of(self, what: str) -> str:
+        """Return the tests of something in words."""
         tests = [f'is {self.equals}'] if self.equals is not None else []
         tests += [f'is one of {", ".join(map(str, self.one_of))}'] if self.one_of else []
         tests += [f'is at least {self.at_least:g}'] if self.at_least is not None else []
         tests += [f'is below {self.below:g}'] if self.below is not None else []
         return f'{what} {" and ".join(tests)}'
+
+
+@dataclass(frozen=True)
+class AnswerCondition(AnswerTest):
+    """
+    A condition on an answer; it does not hold without an answer.
+
+    :param question: name of the question.
+    :param questionnaire: name of its questionnaire, for `exclude`; otherwise it is the same one.
+    :param field: name of a field of the participant, instead of a question.
+    """
+
+    FORM: ClassVar[Form] = Form(_SEE)
+
+    question: ColumnName | None = None
+    questionnaire: ColumnName | None = None
+    field: ColumnName | None = None
+
+    def check(self) -> None:
+        """Refuse a condition on nothing, on two things, or without a test."""
+        if (self.question is None) == (self.field is None):
+            raise InputError('has not one of "question" and "field"', '', 'give exactly one')
+        if self.questionnaire is not None and self.question is None:
+            raise InputError('has "questionnaire" without "question"', '', 'give both')
+        super().check()
+
+    def text(self) -> str:
+        """Return the condition in words."""
+        return self.text_of(self.field or (
+            f'{self.questionnaire}.' if self.questionnaire else '') + str(self.question))
 
 
 def is_one_of(answer: Any, values: tuple[object, ...]) -> bool:

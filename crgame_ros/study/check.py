@@ -14,8 +14,9 @@ from crgame_ros.game.file import parse_game
 from crgame_ros.instruments.extra import require_instruments
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
-from crgame_ros.study.answer_condition import AnswerCondition
+from crgame_ros.study.answer_condition import AnswerCondition, AnswerTest
 from crgame_ros.study.file import Break, DeviceCheck, Page, Questions, StudyFile
+from crgame_ros.study.followed_session import judging_question
 from crgame_ros.study.local_text import LocalText
 from crgame_ros.study.pages import page_file, questionnaire_name, steps_of
 from crgame_ros.study.question import ChoiceQuestion, Question
@@ -64,7 +65,8 @@ class SessionLength:
     """
     The length of a participant's session.
 
-    :param driving_s: maximum driving time, with the maximum number of practice drives.
+    :param driving_s: maximum driving time, with the maximum numbers of practice drives and of
+        trials of staircases.
     :param else_s: approximate time for everything else.
     """
 
@@ -79,7 +81,8 @@ def check_study(study: StudyFile,
 
     :param progress: called with the share that is done, 0 to 1.
     """
-    found = [*_steps(study), *_conditions_on_answers(study), *_together(study), *_balance(study)]
+    found = [*_steps(study), *_conditions_on_answers(study), *_together(study),
+             *_staircases(study), *_balance(study)]
     drives = list(drives_of(study))
     tasks: set[str] = set()
     for number, (name, settings) in enumerate(drives):
@@ -218,6 +221,24 @@ def _conditions_on_answers(study: StudyFile) -> Iterator[StudyFinding]:
             yield StudyFinding('error', f'exclude[{number}]: no question has an expected answer')
 
 
+def _staircases(study: StudyFile) -> Iterator[StudyFinding]:
+    """Yield why no trial of a staircase can be a success."""
+    for block in study.blocks:
+        if block.staircase is None:
+            continue
+        try:
+            judging = judging_question(study, block)
+        except CrgameError as error:
+            yield StudyFinding('error', str(error))
+            continue
+        if judging is not None:
+            where = f'blocks: {block.name}: staircase: success'
+            yield from _impossible(where, block.staircase.success, judging[1])
+            if not judging[1].required:
+                yield StudyFinding('warning', f'{where}: "{judging[1].name}" may be left open: '
+                                              'such a trial counts for nothing')
+
+
 def _untestable(where: str, when: AnswerCondition,
                 known: Mapping[str, Question]) -> Iterator[StudyFinding]:
     """Yield why a condition can never hold: its question is not there, or takes no such answer."""
@@ -226,7 +247,12 @@ def _untestable(where: str, when: AnswerCondition,
         yield StudyFinding('error', f'{where}: "{name}" is asked nowhere; name '
                            f'{", ".join(known) or "a question that is asked"}')
         return
-    kind = known[name].kind
+    yield from _impossible(where, when, known[name])
+
+
+def _impossible(where: str, when: AnswerTest, question: Question) -> Iterator[StudyFinding]:
+    """Yield which tests of an answer can never hold, since the question takes no such answer."""
+    name, kind = question.name, question.kind
     for value in when.values:
         given: object = value
         if isinstance(kind, ChoiceQuestion):
@@ -266,6 +292,8 @@ def _balance(study: StudyFile) -> Iterator[StudyFinding]:
             [[block.name for block in blocks_of(study, place, group)]
              for place in range(places)])
     for block, group in product(study.blocks, groups):
+        if block.staircase is not None:
+            continue
         try:
             orders = [[trial.condition.name for trial in plan_trials(study, place, group)
                        if trial.block == block.name] for place in range(places)]

@@ -19,6 +19,7 @@ from crgame_ros.study.quality import QualityBounds
 from crgame_ros.study.question import check_conditions, Question
 from crgame_ros.study.retention import Retention
 from crgame_ros.study.screening import Exclusion
+from crgame_ros.study.staircase import Staircase
 from crgame_ros.study.trial_order import OrderKind
 from crgame_ros.study.trial_settings import Factor, NOTHING, TrialSettings
 from crgame_ros.yaml_text import read_yaml
@@ -143,6 +144,7 @@ class Block:
     :param order: of the conditions, drawn for each repetition.
     :param sequences: lists of conditions, `level` or `level/level`, assigned to participants in
         turn instead.
+    :param staircase: by which answers decide on the level of the next trial, instead of an order.
     :param settings: of its trials, besides those of the study.
     :param practice: before its first trial.
     :param before: steps before it.
@@ -159,6 +161,7 @@ class Block:
     repetitions: Annotated[int, Within(1, 1000)] = 1
     order: OrderKind = 'williams'
     sequences: Annotated[tuple[tuple[str, ...], ...], Listed(noun='sequence')] = ()
+    staircase: Staircase | None = None
     settings: TrialSettings = NOTHING
     practice: Practice | None = None
     before: Steps = ()
@@ -166,6 +169,13 @@ class Block:
     break_every: Annotated[int, Within(0, 1000)] = 0
     break_minutes: Annotated[float, Within(0.0, 240.0)] = 1.0
     after: Steps = ()
+
+    def check(self) -> None:
+        """Refuse an order beside a staircase."""
+        if self.staircase is not None and (
+                self.repetitions > 1 or self.order != 'williams' or self.sequences):
+            raise InputError('has a staircase, and repetitions or an order of its conditions', '',
+                             'leave out repetitions, order and sequences')
 
 
 @dataclass(frozen=True)
@@ -231,6 +241,8 @@ class StudyFile:
                     raise InputError(f'names the factor "{name}", which is not there',
                                      f'blocks: {block.name}',
                                      f'name {", ".join(sorted(known)) or "none"}')
+            if block.staircase is not None:
+                block.staircase.check_factor(self.factors_of(block), f'blocks: {block.name}')
         names = [block.name for block in self.blocks]
         for number, sequence in enumerate(self.block_sequences):
             if sorted(sequence) != sorted(names):
@@ -240,6 +252,20 @@ class StudyFile:
         self._check_groups()
         self._check_exclusions()
         self.analysis.check_factors(self.all_factors, self.between)
+        self._check_compared()
+
+    def _check_compared(self) -> None:
+        """Refuse a comparison of trials that only staircases have: answers chose their levels."""
+        for number, comparison in enumerate(self.analysis.comparisons):
+            if not self.compared_blocks(comparison.factor):
+                raise InputError(f'is of {comparison.factor}, which only blocks with a staircase '
+                                 'have', f'analysis: comparisons[{number}]',
+                                 'leave it out: answers choose the levels of their trials')
+
+    def compared_blocks(self, factor: str) -> tuple[Block, ...]:
+        """Return the blocks whose trials a comparison of a factor, or of the groups, uses."""
+        return tuple(block for block in self.blocks if block.staircase is None and (
+            factor == self.between or factor in {each.name for each in self.factors_of(block)}))
 
     def _check_groups(self) -> None:
         """Refuse groups that fields cannot form, and steps of groups that are not known there."""
@@ -268,6 +294,11 @@ class StudyFile:
                 raise InputError(f'names the field "{name}", which is not there',
                                  f'exclude[{number}]',
                                  f'name {", ".join(sorted(known)) or "none"}')
+
+    @property
+    def has_staircases(self) -> bool:
+        """Return whether a block has a staircase."""
+        return any(block.staircase is not None for block in self.blocks)
 
     @property
     def all_factors(self) -> tuple[Factor, ...]:

@@ -12,6 +12,7 @@ from typing import Any, Self
 from crgame_ros.errors import InputError
 from crgame_ros.study.enrolment import allocation_of, enrolled, enrolling, free_place
 from crgame_ros.study.file import Page, StudyFile
+from crgame_ros.study.followed_session import followed, judging_question
 from crgame_ros.study.given_answers import exclusion_of, field_answers, last_answers
 from crgame_ros.study.groups import allocate, Allocation
 from crgame_ros.study.pages import questionnaire_of, questions_of
@@ -58,6 +59,12 @@ class ParticipantSession:
         self.allocation: Allocation | None = None
         for name in study.group_names:
             session_of(study, 0, name)
+        for block in study.blocks:
+            if block.staircase is not None:
+                judging_question(study, block)
+        self._planned: tuple[SessionItem, ...] = ()
+        # The number of entries that the items follow from, and the items.
+        self._followed: tuple[int, tuple[SessionItem, ...]] = -1, ()
         self.journal = SessionJournal(folder)
         try:
             self._begin(place, group)
@@ -76,10 +83,11 @@ class ParticipantSession:
             if place is None:
                 place = free_place(self._folder.parent) if begun is None else begun['place']
             self.place = int(place)
-            self.items = self._planned() if self.study.groups is None \
-                else items_before_groups(self.study)
+            member = self._members.index(self.participant) if self._members else 0
+            self._planned = session_of(self.study, self.place, member=member) \
+                if self.study.groups is None else items_before_groups(self.study)
             mine = {'participant': self.participant, 'place': self.place,
-                    'items': [item.id for item in self.items]}
+                    'items': [item.id for item in self._planned]}
             if begun is None:
                 self._add(SessionEvent.BEGUN, **mine, **({} if group is None else {
                     'group': group}), **({'members': self._members} if self._members else {}))
@@ -89,13 +97,23 @@ class ParticipantSession:
             allocation = self.allocation = allocation_of(allocated)
             if allocation.group not in self.study.group_names:
                 raise self._other_plan()
-            self.items = session_of(self.study, allocation.place, allocation.group)
-            if allocated['items'] != [item.id for item in self.items]:
+            self._planned = session_of(self.study, allocation.place, allocation.group)
+            if allocated['items'] != [item.id for item in self._planned]:
                 raise self._other_plan()
 
-    def _planned(self) -> tuple[SessionItem, ...]:
-        member = self._members.index(self.participant) if self._members else 0
-        return session_of(self.study, self.place, member=member)
+    @property
+    def items(self) -> tuple[SessionItem, ...]:
+        """Return the items; of staircases those that are needed as far as the journal tells."""
+        count, before = self._followed
+        if count != len(self.journal.entries):
+            place, group = (self.place, '') if self.allocation is None else (
+                self.allocation.place, self.allocation.group)
+            known = {item.id: item for item in before}
+            # An item that stays the same stays the same object.
+            self._followed = len(self.journal.entries), tuple(
+                known[item.id] if known.get(item.id) == item else item for item in followed(
+                    self.study, place, group, self._planned, self.journal.entries).items)
+        return self._followed[1]
 
     def _other_plan(self) -> InputError:
         return InputError('began with another plan', str(self._folder),
@@ -170,7 +188,7 @@ class ParticipantSession:
             self._add(SessionEvent.ALLOCATED, **asdict(allocation),
                       items=[item.id for item in items])
         # Only what is on the disk counts.
-        self.allocation, self.items = allocation, items
+        self.allocation, self._planned, self._followed = allocation, items, (-1, ())
 
     def __enter__(self) -> Self:
         return self
@@ -297,7 +315,9 @@ class ParticipantSession:
         """
         item = self._now()
         attempt = self.attempts(item.id) + 1
-        self._add(SessionEvent.STARTED, item=item.id, attempt=attempt, run=run)
+        told = {'condition': item.what.condition.name} if isinstance(item.what, PlannedTrial) \
+            and item.what.staircase is not None else {}
+        self._add(SessionEvent.STARTED, item=item.id, attempt=attempt, run=run, **told)
         return attempt
 
     def questions(self, item: SessionItem) -> tuple[Question, ...]:

@@ -52,7 +52,7 @@ _NEEDED: dict[str, tuple[str, ...]] = {
 _TYPES: dict[str, type] = {
     'at': float, 'entry': str,
     **dict.fromkeys(('item', 'participant', 'language', 'run', 'name', 'text', 'reason',
-                     'outcome', 'group', 'page'), str),
+                     'outcome', 'group', 'page', 'condition'), str),
     **dict.fromkeys(('attempt', 'place', 'contacts', 'departures', 'drives', 'slot'), int),
     **dict.fromkeys(('time_s', 'end_time_s', 'start_at', 'asked_at', 'shown_at', 'answered_at',
                      'taken_s', 'clean_s'), float),

@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plans a participant's trials in order, with crossed conditions and combined settings."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import groupby, product
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.file import Block, StudyFile
+from crgame_ros.study.staircase import follow, ToldTrial, Track
 from crgame_ros.study.trial_order import order_of, rows_of
-from crgame_ros.study.trial_settings import drawn, laid, Level, TrialSettings
+from crgame_ros.study.trial_settings import drawn, Factor, laid, Level, TrialSettings
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,8 @@ class PlannedTrial:
     :param block: name of its block.
     :param place: in its block, from 1 on.
     :param repetition: from 1 on.
-    :param condition: its condition.
+    :param condition: its condition; of a staircase as far as the answers before it are known.
+    :param staircase: name of its staircase; None in a block without.
     """
 
     number: int
@@ -47,6 +49,7 @@ class PlannedTrial:
     place: int
     repetition: int
     condition: Condition
+    staircase: str | None = None
 
 
 def conditions_of(study: StudyFile, block: Block, group: str = '') -> tuple[Condition, ...]:
@@ -62,6 +65,64 @@ def conditions_of(study: StudyFile, block: Block, group: str = '') -> tuple[Cond
                   laid(study.settings, block.settings, study.group_settings(group),
                        *(level.settings for level in levels)))
         for levels in product(*(factor.levels for factor in factors)))
+
+
+class BlockStaircases:
+    """
+    The staircases of a block: one of each combination of the factors besides the stepped one.
+
+    :param study: the study.
+    :param block: that has a staircase.
+    :param group: of the participant; empty in a study without groups.
+    :ivar factor: whose levels are the steps.
+    :ivar names: of the staircases: their levels of the other factors, or `all`.
+    """
+
+    def __init__(self, study: StudyFile, block: Block, group: str = '') -> None:
+        assert block.staircase is not None
+        self._study, self._block, self._group = study, block, group
+        self._staircase, name = block.staircase, block.staircase.factor
+        self.factor: Factor = next(each for each in study.factors if each.name == name)
+        steps = [level.name for level in self.factor.levels]
+        whose: dict[str, int] = {}
+        self._conditions: dict[tuple[int, int], Condition] = {}
+        for condition in conditions_of(study, block, group):
+            others = replace(condition, levels=tuple(
+                each for each in condition.levels if each[0] != name))
+            index = whose.setdefault(others.name, len(whose))
+            self._conditions[index, steps.index(dict(condition.levels)[name].name)] = condition
+        self.names = tuple(whose)
+        self._places = {each.name: at for at, each in self._conditions.items()}
+
+    def find(self, condition: str) -> tuple[int, int] | None:
+        """Return the indices of staircase and level of a condition; None if it has another."""
+        return self._places.get(condition)
+
+    @property
+    def most(self) -> int:
+        """Return the greatest number of trials."""
+        return len(self.names) * self._staircase.stop.at_most
+
+    def follow(self, place: int, told: Mapping[int, ToldTrial],
+               before: int) -> tuple[dict[str, Track], list[PlannedTrial]]:
+        """
+        Return the tracks by staircase, and the trials that are needed.
+
+        :param place: of the participant.
+        :param told: by the trials' places in the block.
+        :param before: number of trials before the block.
+        """
+        start = drive_seed(self._study, place, self._group)
+        tracks, found = follow(self._staircase, self.factor, len(self.names),
+                               f'{start} staircases {self._block.name}', told)
+        counts: dict[tuple[int, int], int] = {}
+        trials = []
+        for number, at in found.items():
+            counts[at] = counts.get(at, 0) + 1
+            trials.append(PlannedTrial(
+                before + number, self._block.name, number, counts[at],
+                _drawn(self._conditions[at], start, before + number), self.names[at[0]]))
+        return dict(zip(self.names, tracks, strict=True)), trials
 
 
 def block_rows(study: StudyFile) -> int:
@@ -89,7 +150,7 @@ def blocks_of(study: StudyFile, place: int, group: str = '') -> tuple[Block, ...
 
 def plan_trials(study: StudyFile, place: int, group: str = '') -> tuple[PlannedTrial, ...]:
     """
-    Plan all trials of a participant.
+    Plan all trials of a participant; of staircases the most, as if no answer counted.
 
     :param place: of the participant among all, or in the group, from 0 on.
     :param group: of the participant; empty in a study without groups.
@@ -98,6 +159,9 @@ def plan_trials(study: StudyFile, place: int, group: str = '') -> tuple[PlannedT
     trials: list[PlannedTrial] = []
     in_turn = place // block_rows(study)
     for block in blocks_of(study, place, group):
+        if block.staircase is not None:
+            trials += BlockStaircases(study, block, group).follow(place, {}, len(trials))[1]
+            continue
         conditions = conditions_of(study, block, group)
         sequences = _sequences(block, [condition.name for condition in conditions])
         in_block = 0
@@ -105,12 +169,16 @@ def plan_trials(study: StudyFile, place: int, group: str = '') -> tuple[PlannedT
             for index in order_of(block.order, len(conditions), study.seed, in_turn, repetition,
                                   sequences, group):
                 in_block += 1
-                number, condition = len(trials) + 1, conditions[index]
-                settings = drawn(condition.settings,
-                                 f'{drive_seed(study, place, group)} trial {number}')
-                trials.append(PlannedTrial(number, block.name, in_block, repetition + 1,
-                                           replace(condition, settings=settings)))
+                number = len(trials) + 1
+                trials.append(PlannedTrial(
+                    number, block.name, in_block, repetition + 1,
+                    _drawn(conditions[index], drive_seed(study, place, group), number)))
     return tuple(trials)
+
+
+def _drawn(condition: Condition, start: str, number: int) -> Condition:
+    """Return a condition whose seed is drawn for a trial, if it asks for one."""
+    return replace(condition, settings=drawn(condition.settings, f'{start} trial {number}'))
 
 
 def orders_of(study: StudyFile,
@@ -123,6 +191,20 @@ def orders_of(study: StudyFile,
     """
     for group, place in product(study.group_names, range(places)):
         yield group, place, plan_trials(study, place, group)
+
+
+def told_trials(trials: Iterable[PlannedTrial]) -> Iterator[tuple[str, str, str]]:
+    """Yield number, block and condition of trials as text; those of staircases as one."""
+    for (block, stepped), group in groupby(trials, lambda each: (
+            each.block, each.staircase is not None)):
+        of_block = list(group)
+        if not stepped:
+            yield from ((str(each.number), block, each.condition.name) for each in of_block)
+            continue
+        names = list(dict.fromkeys(str(each.staircase) for each in of_block))
+        count = '1 staircase' if len(names) == 1 else f'{len(names)} staircases'
+        yield (f'{of_block[0].number}-{of_block[-1].number}', block,
+               f'{count}, at most {len(of_block)} trials')
 
 
 def drive_seed(study: StudyFile, place: int, group: str) -> str:

@@ -32,16 +32,21 @@ SLOWEST = 0.1
 
 
 class Participant:
-    """A session that goes on in a thread, and a participant that drives in it."""
+    """
+    A session that goes on in a thread, and a participant that drives in it.
 
-    def __init__(self, folder: Path) -> None:
+    :param block: keys of the block of trials.
+    """
+
+    def __init__(self, folder: Path, **block: Any) -> None:
         settings = {'duration': DURATION_S, 'game': str(scenarios_directory() / 'cut_in.yaml')}
         merge = {'name': 'merge', 'game': str(scenarios_directory() / 'merge.yaml')}
         study = read(StudyFile, {
             'name': 'demo', 'settings': settings,
             'factors': [{'name': 'scene', 'levels': [
                 {'name': 'cut-in', 'planner': 'idm'}, merge]}],
-            'blocks': [{'name': 'main', 'order': 'given', 'repetitions': 2}]}, 'study')
+            'blocks': [{'name': 'main', **(block or {'order': 'given', 'repetitions': 2})}]},
+            'study')
         self.folder = folder
         self.session = ParticipantSession(study, folder, 'P01', 0)
         self.loop = asyncio.new_event_loop()
@@ -181,3 +186,34 @@ def test_each_run_holds_its_own_game(journal: list[dict[str, Any]]) -> None:
     assert 'Merge' in games['main/2']
     assert 'Merge' in games['main/4']
     assert len({entry['run'] for entry in finished.values()}) == 3
+
+
+def test_the_level_that_an_answer_decides_on_is_driven(tmp_path: Path) -> None:
+    folder = tmp_path / 'participants' / 'P01'
+    staircase = {'factor': 'scene', 'rule': '1-down 1-up', 'stop': {'at_most': 2},
+                 'success': {'question': 'useful', 'at_least': 3}}
+    with Participant(folder, staircase=staircase,
+                     after_trial=[{'questions': 'van_der_laan'}]) as person:
+        def answer() -> None:
+            item = person.session.next_item
+            assert item is not None
+            person.session.finish({each.name: 5 for each in person.session.questions(item)})
+            person.drives.wake()
+
+        person.begin('main/1')
+        # While the participant answers, the foreseen level is loaded: the same again.
+        wait_until(lambda: person.drives._loaded is not None
+                   and person.drives._loaded.item.id == 'main/2', 'the next game')
+        assert person.session.next_item.id == 'main/1/after/1'
+        person.call(answer)
+        person.begin('main/2')
+        wait_until(lambda: person.session.next_item.id == 'main/2/after/1', 'the second drive')
+        person.call(answer)
+        wait_until(lambda: person.session.next_item is None, 'the end')
+        person._thread.join(90.0)
+    entries = read_journal(folder)
+    assert [entry['condition'] for entry in entries if entry['entry'] == 'started'] == [
+        'cut-in', 'merge']
+    for entry, game in zip((entry for entry in entries if entry.get('run') and entry[
+            'entry'] == 'finished'), ('CutIn', 'Merge'), strict=True):
+        assert game in (folder / entry['run'] / 'game.yaml').read_text()

@@ -45,15 +45,15 @@ def model_formulas(study: StudyFile) -> list[ModelFormula]:
     Return the model of each planned comparison, each once.
 
     Its trials are those of the blocks that cross the comparison's factor, of groups those of all
-    blocks. Its fixed effects are the factors that all these blocks cross, and the groups.
+    blocks, without blocks that have a staircase. Its fixed effects are the factors that all these
+    blocks cross, and the groups.
     """
     return list(dict.fromkeys(_formula(study, comparison)
                               for comparison in study.analysis.comparisons))
 
 
 def _formula(study: StudyFile, comparison: Comparison) -> ModelFormula:
-    blocks = [block for block in study.blocks if comparison.factor == study.between
-              or comparison.factor in {each.name for each in study.factors_of(block)}]
+    blocks = study.compared_blocks(comparison.factor)
     factors = tuple(factor for factor in study.factors
                     if all(factor in study.factors_of(block) for block in blocks))
     groups = () if study.groups is None else (study.groups.factor,)

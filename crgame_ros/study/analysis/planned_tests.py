@@ -34,10 +34,11 @@ class PlannedTest:
 
 
 def used_rows(study: StudyFile, rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return the trials that the planned analysis uses."""
-    if study.analysis.flagged == 'use':
-        return list(rows)
-    return [row for row in rows if not any(row.get(flag) for flag in FLAGS)]
+    """Return the trials that the planned analysis uses: none of staircases."""
+    stepped = {block.name for block in study.blocks if block.staircase is not None}
+    flags = () if study.analysis.flagged == 'use' else FLAGS
+    return [row for row in rows if row.get('block') not in stepped
+            and not any(row.get(flag) for flag in flags)]
 
 
 def level_means(rows: Iterable[Mapping[str, Any]], column: str,

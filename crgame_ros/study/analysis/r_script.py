@@ -76,6 +76,11 @@ def r_script(study: StudyFile, columns: Mapping[str, str]) -> str:
     flagged = '' if analysis.flagged == 'use' else (
         '# Trials beyond a bound of quality are left out.\n'
         f'trials <- trials[!({" | ".join(f"trials${flag} %in% TRUE" for flag in FLAGS)}), ]\n')
+    stepped = [block.name for block in study.blocks if block.staircase is not None]
+    if stepped:
+        flagged += ('# Of staircases, answers choose the levels of the trials.\n'
+                    f'trials <- trials[!(trials$block %in% c({", ".join(map(_text, stepped))})), '
+                    ']\n')
     # Both kinds of tests are rows of one table.
     more = '' if study.groups is None else ', d_s = NA, g_s = NA'
     parts = [_HEAD.format(name=study.name, alpha=analysis.alpha, flagged=flagged, more=more)]

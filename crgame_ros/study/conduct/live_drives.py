@@ -168,7 +168,8 @@ class LiveDrives:
             await self._wait()
 
     async def _prepare(self, item: SessionItem) -> StudyDrive:
-        if self._loaded is not None and self._loaded.item.id == item.id:
+        # A foreseen trial of a staircase may have another level by now.
+        if self._loaded is not None and self._loaded.item == item:
             return self._loaded
         if self._is_due(item):
             self._set_phase(DrivePhase.PREPARING, item.id, work=DriveWork.LOADING)

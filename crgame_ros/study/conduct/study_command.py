@@ -151,7 +151,7 @@ def check_command(values: argparse.Namespace) -> int:
     from crgame_ros.study.data.study_data_command import told_overdue
     from crgame_ros.study.file import load_study
     from crgame_ros.study.session_script import members_of
-    from crgame_ros.study.trial_plan import orders_of
+    from crgame_ros.study.trial_plan import orders_of, told_trials
     if not 0 <= values.participants <= 10_000:
         raise InputError(f'is {values.participants}', '--participants', 'give 0 to 10000')
     study = load_study(values.file)
@@ -167,13 +167,17 @@ def check_command(values: argparse.Namespace) -> int:
     members = members_of(study)
     if study.groups is not None:
         print(f'groups by {study.groups.name}: {study.groups.told}')
+    for block in study.blocks:
+        if block.staircase is not None:
+            print(f'block {block.name}: {block.staircase.told}')
     for group, place, trials in orders_of(study, values.participants):
         print(f'{group}, place {place + 1}:' if group
               else f'{"participant" if members == 1 else "place"} {place + 1}:')
-        for trial in trials:
-            print(f'  {trial.number:3}  {trial.block}  {trial.condition.name}')
+        for number, block_name, what in told_trials(trials):
+            print(f'  {number:>3}  {block_name}  {what}')
     length = length_of(study)
-    print(f'a session takes about {(length.driving_s + length.else_s) / 60.0:.0f} min, '
+    print(f'a session takes {"at most " if study.has_staircases else ""}about '
+          f'{(length.driving_s + length.else_s) / 60.0:.0f} min, '
           f'{length.driving_s / 60.0:.0f} of them driving')
     return 0
 

@@ -37,6 +37,8 @@ def method_of(study: StudyFile) -> str:
         else 'the tests of each comparison'
     flagged = 'Trials beyond a bound of quality are used.' if analysis.flagged == 'use' \
         else 'Trials beyond a bound of quality (timing_flag, page_flag) are left out.'
+    stepped = ' Trials of staircases are left out: answers choose their levels.' \
+        if study.has_staircases else ''
     between = '' if all(each.factor != study.between for each in analysis.comparisons) else (
         'Between groups, a participant’s value is the mean over all its trials; test and interval '
         'are those of Welch, with Satterthwaite’s degrees of freedom, beside the test of Mann and '
@@ -48,4 +50,4 @@ def method_of(study: StudyFile) -> str:
         f'its two-sided {100.0 * (1.0 - analysis.alpha):g} % interval by Student’s t. p is that '
         'of the paired t-test, p (Holm) is corrected by Holm (1979) over '
         f'{family}, with α = {analysis.alpha:g}. Beside it stands the p-value of Wilcoxon’s '
-        f'signed-rank test, uncorrected. {between}{flagged}')
+        f'signed-rank test, uncorrected. {between}{flagged}{stepped}')

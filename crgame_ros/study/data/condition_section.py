@@ -279,8 +279,11 @@ def condition_section(data: StudyData) -> str:
     study = data.folder.study
     blocks: dict[tuple[str, ...], list[str]] = {}
     for block in study.blocks:
-        names = tuple(condition.name for condition in conditions_of(study, block))
-        blocks.setdefault(names, []).append(block.name)
+        if block.staircase is None:
+            names = tuple(condition.name for condition in conditions_of(study, block))
+            blocks.setdefault(names, []).append(block.name)
+    if not blocks:
+        return note('All blocks have staircases: answers choose the levels of their trials.')
     html = note('Of each participant and condition the mean over its trials is taken, then the '
                 'mean over participants. Points are participants, squares are means with their '
                 '95 % intervals.')

@@ -28,6 +28,7 @@ from crgame_ros.study.question import (
     VasQuestion,
 )
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
+from crgame_ros.study.staircase import OUTCOMES
 from crgame_ros.study.trial_plan import PlannedTrial
 from crgame_ros.whole_file import write_text
 import numpy as np
@@ -47,7 +48,8 @@ def make_study(study: StudyFile, file: Path, pictures: Sequence[str], out: Path,
     Make the folder of a study with sessions that nobody has done.
 
     Journals are those of real sessions, with random answers, and with a value of each planned
-    measure for each trial, as the simulation of power draws it. There are no recordings.
+    measure for each trial, as the simulation of power draws it; trials of staircases have random
+    values of the drive, and no measures. There are no recordings.
 
     :param file: of the study.
     :param pictures: of its pages.
@@ -96,7 +98,10 @@ def _finish_all(session: ParticipantSession, rng: np.random.Generator,
                 values = {row['trial']: {measure: row[measure] for measure in measures}
                           for row in draw(SimulatedPerson(session.participant, place, group))}
             attempt = session.start()
-            session.finish(run='', attempt=attempt, outcome='time', made=values[what.number])
+            told = {'outcome': 'time'} if what.staircase is None else {
+                'outcome': OUTCOMES[int(rng.integers(len(OUTCOMES)))],
+                'contacts': int(rng.integers(2)), 'departures': int(rng.integers(2))}
+            session.finish(run='', attempt=attempt, made=values.get(what.number, {}), **told)
         elif isinstance(what, Page):
             session.finish(agreed=True)
         else:

@@ -48,6 +48,8 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
                        _plain(write(condition.settings))
                        for group in study.group_names for block in study.blocks
                        for condition in conditions_of(study, block, group)},
+        'staircases': {block.name: block.staircase.told for block in study.blocks
+                       if block.staircase is not None},
         'random_seeds': sorted({row['random_seed'] for row in _rows(data)
                                 if row.get('random_seed') is not None}),
         'questionnaires': [{
@@ -146,7 +148,9 @@ def _study(data: StudyData, told: Mapping[str, Any]) -> Iterator[Sequence[str]]:
         factors = ' × '.join(f'{factor.name} ({len(factor.levels)})'
                              for factor in study.factors_of(block)) or 'one condition'
         times = 'once' if block.repetitions == 1 else f'{block.repetitions} times'
-        yield f'Block {free(block.name)}', free(f'{factors}, {times} each, order: {order}')
+        yield f'Block {free(block.name)}', free(
+            f'{factors}, {times} each, order: {order}' if block.staircase is None
+            else f'{factors}, {block.staircase.told}')
     views = dict.fromkeys(str(settings.get('view')) for settings in told['conditions'].values())
     yield 'View at the start', ', '.join(plain(_VIEWS.get(view, view)) for view in views)
     shown = told['view']

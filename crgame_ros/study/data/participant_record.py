@@ -3,7 +3,7 @@
 """The content of a participant's journal: attempts, those that count, and answers."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -11,12 +11,14 @@ from typing import Any, Literal
 from crgame_ros.errors import InputError
 from crgame_ros.study.enrolment import allocation_of
 from crgame_ros.study.file import StudyFile
+from crgame_ros.study.followed_session import followed
 from crgame_ros.study.given_answers import failed_checks, last_answers
 from crgame_ros.study.groups import Allocation
 from crgame_ros.study.pages import questions_of
 from crgame_ros.study.question import Answer
 from crgame_ros.study.session_journal import DECLINED, read_journal, SessionEvent
 from crgame_ros.study.session_script import items_before_groups, session_of, SessionItem
+from crgame_ros.study.staircase import Track
 from crgame_ros.study.trial_plan import PlannedTrial
 
 Ending = Literal['finished', 'aborted', 'lost', 'open']
@@ -86,6 +88,7 @@ class ParticipantRecord:
     :param entries: of the journal.
     :param allocation: to a group; None before it, and in a study without groups.
     :param members: ids of those who drove together, in the order of their seats; else empty.
+    :param tracks: of the staircases, by block and staircase.
     """
 
     id: str  # noqa: A003
@@ -96,6 +99,7 @@ class ParticipantRecord:
     entries: tuple[Mapping[str, Any], ...]
     allocation: Allocation | None = None
     members: tuple[str, ...] = ()
+    tracks: Mapping[tuple[str, str], Track] = field(default_factory=dict)
 
     @property
     def recordings(self) -> Path:
@@ -230,7 +234,11 @@ class ParticipantRecord:
 
     @property
     def trials_planned(self) -> int:
-        """Return the number of trials in the session; of the first group before an allocation."""
+        """
+        Return the number of trials in the session; of the first group before an allocation.
+
+        A staircase that has not ended counts with its most trials.
+        """
         items = session_of(self.study, 0, self.study.group_names[0]) if self._awaits_group \
             else self.items.values()
         return sum(isinstance(item.what, PlannedTrial) for item in items)
@@ -308,9 +316,12 @@ def read_participant(study: StudyFile, folder: Path) -> ParticipantRecord | None
     if [item.id for item in items] != noted:
         raise InputError('began with another plan than that of the study file', str(folder),
                          'put back the study file that the sessions were run with')
+    place, group = (begun['place'], '') if allocation is None else (
+        allocation.place, allocation.group)
+    session = followed(study, place, group, items, entries)
     return ParticipantRecord(begun['participant'] or folder.name, begun['place'], folder, study,
-                             {item.id: item for item in items}, entries, allocation,
-                             tuple(begun.get('members') or ()))
+                             {item.id: item for item in session.items}, entries, allocation,
+                             tuple(begun.get('members') or ()), session.tracks)
 
 
 def _member(begun: Mapping[str, Any]) -> int:

@@ -21,7 +21,7 @@ from crgame_ros.study.data.trials_table import declare_trials
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.folder import StudyFolder
 from crgame_ros.study.trial_order import OrderKind
-from crgame_ros.study.trial_plan import orders_of
+from crgame_ros.study.trial_plan import orders_of, told_trials
 from crgame_ros.yaml_text import read_text
 
 PREREGISTRATION = 'preregistration.md'
@@ -138,9 +138,16 @@ def _design(study: StudyFile) -> Iterator[str]:
     yield from ('| block | factors | repetitions | order |', '|---|---|---|---|')
     for block in study.blocks:
         names = ' × '.join(factor.name for factor in study.factors_of(block)) or 'one condition'
-        yield f'| {block.name} | {names} | {block.repetitions} ' \
-            f'| {_order(block.order, block.sequences)} |'
+        order = _order(block.order, block.sequences) if block.staircase is None else \
+            'by answers, see below'
+        yield f'| {block.name} | {names} | {block.repetitions} | {order} |'
     yield ''
+    for block in study.blocks:
+        if block.staircase is not None:
+            yield from (f'Block {block.name}: {block.staircase.told}. Each trial draws one of its '
+                        'staircases, one for each combination of the other factors, by the seed. '
+                        'The threshold is the mean of the levels at the last even number of '
+                        'reversals, without those of first steps (Levitt 1971).', '')
     if len(study.blocks) > 1:
         yield from (f'Order of the blocks: {_order(study.block_order, study.block_sequences)}.',
                     '')
@@ -161,8 +168,8 @@ def _orders(study: StudyFile) -> Iterator[str]:
                 'a participant who drops out is free again.', '',
                 '| place | trials, in this order |', '|---|---|')
     for group, place, trials in orders_of(study, -(-study.participants // len(groups))):
-        told = ', '.join(trial.condition.name if len(study.blocks) == 1 else
-                         f'{trial.block}: {trial.condition.name}' for trial in trials)
+        told = ', '.join(what if len(study.blocks) == 1 else f'{block}: {what}'
+                         for _, block, what in told_trials(trials))
         yield f'| {group} {place + 1} | {told} |'.replace('|  ', '| ')
     yield ''
 

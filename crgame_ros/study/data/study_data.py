@@ -21,6 +21,7 @@ from crgame_ros.study.data.conducted_study import ConductedStudy
 from crgame_ros.study.data.participant_record import AnsweredItem, ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.run_tables import RunTables, RunTablesCache
 from crgame_ros.study.data.session_events_table import event_rows, EVENTS_OF_SESSIONS
+from crgame_ros.study.data.staircases_table import staircase_rows, StaircaseColumns, STAIRCASES
 from crgame_ros.study.data.study_row_table import (
     flag_column,
     question_column,
@@ -34,7 +35,7 @@ from crgame_ros.study.session_script import Fields
 import pyarrow as pa
 
 KEPT = '.runs'
-TABLE_NAMES = ('trials', 'participants', 'answers', 'events')
+TABLE_NAMES = ('trials', 'participants', 'answers', 'events', 'staircases')
 _PARTICIPANT_COLUMNS = (
     PARTICIPANT, Column('place', INTEGER, '1', 'among all participants, from 1 on'),
     Column('language', TEXT, '', 'that was chosen', empty='not reported'),
@@ -89,9 +90,11 @@ class ParticipantsTable:
                                 empty='it was not known yet', values=study.groups.names)
         grouped = () if self.group is None else (
             self.group, replace(PLACE_IN_GROUP, empty='likewise'))
+        self._stepped = StaircaseColumns(study, {*taken, *(column.name for column in grouped)})
         self.declaration = TableDeclaration(
             'participants', 'a participant who has begun', ('participant',),
-            (*_PARTICIPANT_COLUMNS, *grouped, *self._fields.values(), *answers))
+            (*_PARTICIPANT_COLUMNS, *grouped, *self._fields.values(), *self._stepped.columns,
+             *answers))
 
     @property
     def fields(self) -> list[Column]:
@@ -109,7 +112,7 @@ class ParticipantsTable:
                or None, 'sessions': len(runs),
                'trials': len(record.counted), 'trials_planned': record.trials_planned,
                'complete': record.complete, **_consent(record),
-               **_excluded(record),
+               **_excluded(record), **self._stepped.values(record),
                'end_reason': next((entry.get('reason') for entry in record.entries
                                    if entry['entry'] == SessionEvent.ENDED), None)}
         if self.group is not None and record.allocation is not None:
@@ -276,7 +279,7 @@ class StudyData:
     :param people_table: builds the rows of participants.
     :param records: of all participants.
     :param trials: the trials that count, in the order of participants and trials.
-    :param tables: by name: trials, participants, answers, events.
+    :param tables: by name: trials, participants, answers, events, and staircases if there are any.
     """
 
     folder: ConductedStudy
@@ -291,7 +294,8 @@ class StudyData:
     def declarations(self) -> tuple[TableDeclaration, ...]:
         """Return the declarations of the tables, in their order."""
         return (self.trials_table.declaration, self.people_table.declaration, ANSWERS,
-                EVENTS_OF_SESSIONS)
+                EVENTS_OF_SESSIONS,
+                *((STAIRCASES,) if self.folder.study.has_staircases else ()))
 
     @property
     def factor_columns(self) -> dict[str, str]:
@@ -345,6 +349,9 @@ def read_study_data(folder: ConductedStudy, say: Callable[[str], object],
             people.row(record) for record in records)),
         'answers': table_of_rows(ANSWERS, _answers(data)),
         'events': table_of_rows(EVENTS_OF_SESSIONS, events)}
+    if folder.study.has_staircases:
+        data.tables[STAIRCASES.name] = table_of_rows(STAIRCASES, (
+            row for record in records for row in staircase_rows(record)))
     return data
 
 

@@ -13,6 +13,7 @@ from crgame_ros.study.data.condition_section import condition_section
 from crgame_ros.study.data.paper_section import paper_section
 from crgame_ros.study.data.participant_flow import flow_table
 from crgame_ros.study.data.planned_section import planned_section
+from crgame_ros.study.data.staircase_section import staircase_section
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
 from crgame_ros.whole_file import write_text
 
@@ -50,6 +51,8 @@ def study_html(data: StudyData) -> str:
         Section('conditions', 'Conditions', condition_section(data)),
         *([Section('planned', 'Planned comparisons', planned_section(data))]
           if study.analysis.comparisons else ()),
+        *([Section('staircases', 'Staircases', staircase_section(data))]
+          if study.has_staircases else ()),
         Section('people', 'Who took part', flow_table(data) + _people(data)),
         Section('troubles', 'Left out, aborted, repeated', _troubles(data)),
         Section('timing', 'Timing of each trial', _timing(data)),

@@ -68,6 +68,12 @@ PARTICIPANT = Column('participant', TEXT, '', 'anonymous id')
 TRIAL = Column('trial', INTEGER, '1', 'number among all of the participant, from 1 on')
 PLACE_IN_GROUP = Column('place_in_group', INTEGER, '1', 'of the participant in the orders of the '
                         'group, from 1 on')
+STAIRCASE_COLUMNS = (
+    Column('staircase', TEXT, '', 'name of its staircase', empty='its block has none'),
+    Column('success', FLAG, '', 'whether it was a success for the staircase',
+           empty='its block has no staircase, or it counts for nothing there'),
+    Column('reversal', FLAG, '', 'whether the direction of the staircase changed after it',
+           empty='its block has no staircase'))
 _FIRST = (
     PARTICIPANT, TRIAL,
     Column('place', INTEGER, '1', 'of the participant among all, from 1 on: says the order'),
@@ -164,7 +170,8 @@ def declare_trials(study: StudyFile,
     runs = {column.name: column for column in RUNS.columns}
     fixed = [*_DRIVE, *(runs[name] for name in _RUN_COLUMNS), *_TIMING,
              *measure_columns().values(), *TASK_COLUMNS, _ANSWERED]
-    taken = {column.name for column in (*_FIRST, PLACE_IN_GROUP, *fixed)}
+    stepped = STAIRCASE_COLUMNS if study.has_staircases else ()
+    taken = {column.name for column in (*_FIRST, PLACE_IN_GROUP, *stepped, *fixed)}
     factors: dict[str, Column] = {}
     for factor in study.all_factors:
         name = unlike(factor.name, taken, '_level')
@@ -178,7 +185,7 @@ def declare_trials(study: StudyFile,
     return factors, TableDeclaration(
         'trials', 'a trial that counts', ('participant', 'trial'),
         (*_FIRST, *factors.values(), *((PLACE_IN_GROUP,) if study.groups is not None else ()),
-         *fixed, *_apart(answers, taken)))
+         *stepped, *fixed, *_apart(answers, taken)))
 
 
 def _between(study: StudyFile, factor: Factor) -> str:
@@ -211,7 +218,7 @@ class TrialsTable:
         trial = attempt.trial
         row = {**_identity(record, trial), **{
             self.factors[name].name: level.name for name, level in trial.condition.levels},
-            **self._grouped(record),
+            **self._grouped(record), **_stepped(record, trial),
             **self._drive(record, attempt), 'problem': problem or None}
         if run is not None:
             row |= self._measured(attempt, run)
@@ -290,6 +297,17 @@ class TrialsTable:
                 found |= scale.values(answered.answers)
                 found['answered_attempt'] = answered.attempt
         return found
+
+
+def _stepped(record: ParticipantRecord, trial: PlannedTrial) -> dict[str, object]:
+    """Return the columns of the staircase of a trial."""
+    if trial.staircase is None:
+        return {}
+    track = record.tracks[trial.block, trial.staircase]
+    index, step = next((index, step) for index, step in enumerate(track.trials)
+                       if step.place == trial.place)
+    return {'staircase': trial.staircase, 'success': step.success,
+            'reversal': index in track.reversals}
 
 
 def utc(at_s: float) -> str:

@@ -137,7 +137,10 @@ def _drive(desk: Desk, item: SessionItem) -> dict[str, Any]:
              'attempt': state.attempt, 'awaits_others': state.awaits_others,
              'practice': isinstance(what, PracticeDrives)}
     if isinstance(what, PlannedTrial):
-        drive['number'] = what.number
+        # The last trials of a staircase may not be needed, and leave gaps in the numbers.
+        drive['number'] = 1 + sum(isinstance(each.what, PlannedTrial)
+                                  and each.what.number < what.number
+                                  for each in desk.session.items)
     else:
         drive['number'] = 1 + practised(desk, item)
     return drive
@@ -263,12 +266,20 @@ def _items(desk: Desk) -> list[dict[str, object]]:
                 states.pop(name, None)
                 ends.pop(name, None)
     now, without = session.next_item, {'outcome': '', 'reason': '', 'doubts': []}
+    state_of = {item.id: 'now' if now is not None and item.id == now.id
+                else states.get(item.id, 'to_come') for item in session.items}
     return [{'id': item.id, **kind_of(item), 'attempts': attempts[item.id],
-             'condition': item.what.condition.name if isinstance(item.what, PlannedTrial) else '',
+             'condition': _condition_of(item, state_of[item.id]),
              'trial': item.what.number if isinstance(item.what, PlannedTrial) else item.trial,
-             **ends.get(item.id, without),
-             'state': 'now' if now is not None and item.id == now.id
-             else states.get(item.id, 'to_come')} for item in session.items]
+             **ends.get(item.id, without), 'state': state_of[item.id]} for item in session.items]
+
+
+def _condition_of(item: SessionItem, state: str) -> str:
+    """Return the condition of a trial; empty for other items, and where answers decide on it."""
+    what = item.what
+    if not isinstance(what, PlannedTrial) or state == 'to_come' and what.staircase is not None:
+        return ''
+    return what.condition.name
 
 
 def kind_of(item: SessionItem) -> dict[str, str]:
