@@ -241,9 +241,10 @@ class Curve:
             along, aside = seen_from(pose, points)
             if exact and np.abs(along).max() < exact:
                 break
-            # Beyond the centre of curvature Newton's step would point the wrong way.
-            stretch = np.maximum(1.0 - pose[:, 3] * aside, _LEAST_STRETCH)
-            s = s + along / (stretch if left or exact else 1.0)
+            if left or exact:
+                # Beyond the centre of curvature Newton's step would point the wrong way.
+                along /= np.maximum(1.0 - pose[:, 3] * aside, _LEAST_STRETCH)
+            s = s + along
         return s, aside
 
     def _refine_few(self, points: list[list[float]], s: list[float], rounds: int,

@@ -29,7 +29,11 @@ from crgame_ros.analysis.criticality.own_path import OwnPaths
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.curve import Curve
-from crgame_ros.geometry.reference_point import shifted, shifted_velocities
+from crgame_ros.geometry.reference_point import (
+    shifted,
+    shifted_velocities,
+    zero_for_nan,
+)
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import goal_lanelets
 from crgame_ros.simulation.observer import ObservedRun
@@ -330,7 +334,7 @@ class Criticality:
         result = np.zeros_like(moves)
         if self._before is not None and time_s > self._before[0]:
             lapse = time_s - self._before[0]
-            result = np.nan_to_num((moves - self._before[1]) / lapse)
+            result = zero_for_nan((moves - self._before[1]) / lapse)
         own, yaw = states[:, StateColumn.ACCELERATION], poses[:self.vehicles, 2]
         result[:self.vehicles] = own[:, None] * np.column_stack((np.cos(yaw), np.sin(yaw)))
         self._before = (time_s, moves)
