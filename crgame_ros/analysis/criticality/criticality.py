@@ -384,10 +384,12 @@ class Criticality:
         for tick in self.latest:
             found = self._found[tick.subject]
             values, others = (each.tolist() for each in tick.worst())
-            for name, value, other in zip(MEASURES, values, others, strict=True):
+            for (name, measure), value, other in zip(
+                    MEASURES.items(), values, others, strict=True):
+                if other < 0:
+                    continue
                 known = found.worst.get(name)
-                if other >= 0 and (known is None
-                                   or MEASURES[name].worst * (value - known.value) > 0.0):
+                if known is None or measure.worst * (value - known.value) > 0.0:
                     found.worst[name] = Worst(value, self.ids[other], time_s)
             found.headways.add(tick.following, values[COLUMN['ttc']])
             for name, exposure in EXPOSURES.items():
