@@ -109,9 +109,9 @@ def _is_near(goal: TraceState, positions: NDArray[np.float64]) -> NDArray[np.boo
     if getattr(goal, 'position', None) is None:
         return np.ones(len(positions), dtype=bool)
     x_min, y_min, x_max, y_max = group_outline(goal.position).bounds
-    low, high = (x_min - _BOX_MARGIN, y_min - _BOX_MARGIN), (x_max + _BOX_MARGIN,
-                                                            y_max + _BOX_MARGIN)
-    return np.asarray(((positions >= low) & (positions <= high)).all(axis=1))
+    low, high = np.array((x_min, y_min)), np.array((x_max, y_max))
+    return np.asarray(((positions >= low - _BOX_MARGIN)
+                       & (positions <= high + _BOX_MARGIN)).all(axis=1))
 
 
 def is_reached(problem: PlanningProblem, state: KSState | PMState) -> bool:
