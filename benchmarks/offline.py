@@ -5,11 +5,13 @@ The speed of the offline runner: vehicle steps per second, the cut-in game, and 
 
 A cell is one run of a game from its file on: loading, placing all vehicles, the first step. It is
 cold in a process that has run nothing yet, and warm where this scenario has been run before. CPU
-time of one process, all kinds in turns.
+time of one process, all kinds in turns. With --against, another version of the program does the
+same in a process beside this one, in turns with it.
 """
 
 import argparse
 from collections.abc import Callable
+import os
 from pathlib import Path
 import statistics
 import subprocess
@@ -20,8 +22,13 @@ import time
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.run_tables import write_tables
+from crgame_ros.evaluation.cell_grid import make_grid
+from crgame_ros.evaluation.cell_run import compute_cell
+from crgame_ros.evaluation.content import ContentStore
+from crgame_ros.evaluation.plan import EvaluationPlan, PlannerChoice
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
+from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.offline import observed_run, run_offline
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.vehicle.driver_command import DriverCommand
@@ -32,6 +39,8 @@ from crgame_ros.vehicle.state import VehicleState
 
 STEPS = 20_000
 COLD_STARTS = 3
+# Before a time that a process tells another.
+TOLD = 'seconds:'
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -67,52 +76,108 @@ def cold_start() -> float:
     return float(told.stdout)
 
 
+class Work:
+    """
+    The kinds of work that are timed in turns, each ready to be done once.
+
+    :ivar kinds: by name, with the time that is wanted [s]
+    :ivar hashes: of the states of all games so far.
+    """
+
+    def __init__(self) -> None:
+        self.setup, self.hashes = start_cell(), set[str]()
+        self._folder = tempfile.TemporaryDirectory()
+        store = ContentStore(Path(self._folder.name))
+        cell, = make_grid(EvaluationPlan(
+            (str(scenarios_directory() / 'cut_in.yaml'),), (),
+            planners=(PlannerChoice('idm'),), seeds=1, duration=10.0, base=Path.cwd()), store)
+        compute_cell(cell, store.folder)
+        run_cell()
+        self.kinds: dict[str, tuple[Callable[[], object], str]] = {
+            'start of a cell, warm [s]': (start_cell, '<= 0.05'),
+            'cut-in game, 20 s, idm [s]': (lambda: self._game(False, False), ''),
+            'the same with drivability at 100 Hz [s]': (lambda: self._game(True, False), ''),
+            'the same with criticality too [s]': (lambda: self._game(True, True), '<= 0.25'),
+            'a cell of an evaluation, 10 s [s]': (
+                lambda: compute_cell(cell, store.folder), '<= 0.2'),
+            'a cell of 10 s, all measures and rows [s]': (run_cell, '<= 0.3')}
+
+    def _game(self, checked: bool, measured: bool) -> None:
+        observers = [Criticality(observed_run(self.setup))] if measured else []
+        self.hashes.add(run_offline(self.setup, duration_s=20.0, check_drivability=checked,
+                                    observers=observers).state_hash)
+
+    def serve(self) -> None:
+        """Do the kinds that are named on standard input, a line each; tell their times [s]."""
+        for line in sys.stdin:
+            print(TOLD, seconds(self.kinds[line.rstrip('\n')][0]), flush=True)
+
+
+def compare(work: Work, other: Path, rounds: int) -> None:
+    """Time this version and another one in turns, and print both."""
+    process = subprocess.Popen(
+        [sys.executable, str(Path(__file__).resolve()), '--serve'], text=True, cwd=other,
+        env=os.environ | {'PYTHONPATH': str(other)}, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert process.stdin is not None and process.stdout is not None
+
+    def theirs(name: str) -> float:
+        print(name, file=process.stdin, flush=True)
+        return next(float(line.removeprefix(TOLD)) for line in process.stdout or ()
+                    if line.startswith(TOLD))
+
+    times: dict[str, list[tuple[float, float]]] = {name: [] for name in work.kinds}
+    for _ in range(rounds):
+        for name, (own, _) in work.kinds.items():
+            times[name].append((theirs(name), seconds(own)))
+    process.communicate()
+    print(f'{"":42}{"other: least":>14}{"median":>9}{"this: least":>13}{"median":>9}')
+    for name, pairs in times.items():
+        before, now = zip(*pairs, strict=True)
+        print(f'{name:42}{min(before):14.3f}{statistics.median(before):9.3f}{min(now):13.3f}'
+              f'{statistics.median(now):9.3f}')
+
+
 def main() -> None:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--rounds', type=int, default=7)
+    parser.add_argument('--against', type=Path, metavar='FOLDER',
+                        help='of another version of the program, to compare with it in turns')
     parser.add_argument('--cold', action='store_true', help='start one cell, and say how long [s]')
+    parser.add_argument('--serve', action='store_true', help=argparse.SUPPRESS)
     values = parser.parse_args()
     if values.cold:
         print(seconds(start_cell))
         return
-    rounds = values.rounds
+    rounds, work = values.rounds, Work()
+    if values.serve:
+        work.serve()
+        return
+    if values.against is not None:
+        compare(work, values.against.resolve(), rounds)
+        return
     vehicle = HumanVehicle(load_vehicle_parameters(), VehicleState(0.0, 0.0, 0.0, 10.0))
     command = DriverCommand(0.2, 0.0, 0.1)
-    setup, hashes = start_cell(), set()
-
-    def game(checked: bool, measured: bool) -> None:
-        observers = [Criticality(observed_run(setup))] if measured else []
-        hashes.add(run_offline(setup, duration_s=20.0, check_drivability=checked,
-                               observers=observers).state_hash)
-
-    run_cell()
-    kinds = {
-        'start of a cell, warm [s]': (start_cell, '<= 0.05'),
-        'cut-in game, 20 s, idm [s]': (lambda: game(False, False), ''),
-        'the same with drivability at 100 Hz [s]': (lambda: game(True, False), ''),
-        'the same with criticality too [s]': (lambda: game(True, True), '<= 0.25'),
-        'a cell of 10 s, all measures and rows [s]': (run_cell, '<= 0.72')}
-    times: dict[str, list[float]] = {name: [] for name in kinds}
+    times: dict[str, list[float]] = {name: [] for name in work.kinds}
     for _ in range(rounds):
-        for name, (work, _) in kinds.items():
-            times[name].append(seconds(work))
+        for name, (kind, _) in work.kinds.items():
+            times[name].append(seconds(kind))
     rows = [
         ('KS model step (CRG 2-4) [us]', microseconds_per_call(
             lambda: integrate(0.0, 0.0, 0.0, 10.0, 0.1, 1.0, 0.1, 2.58, 0.01), rounds), '< 5'),
         ('human vehicle step, pedals to pose [us]',
          microseconds_per_call(lambda: vehicle.step(command, 0.01), rounds), '< 5'),
         ('start of a cell, cold [s]', [cold_start() for _ in range(COLD_STARTS)], ''),
-        *((name, times[name], wanted) for name, (_, wanted) in kinds.items())]
+        *((name, times[name], wanted) for name, (_, wanted) in work.kinds.items())]
     print(f'{"":42}{"least":>9}{"median":>9}{"worst":>9}  wanted')
     for name, found, wanted in rows:
         print(f'{name:42}{min(found):9.4f}{statistics.median(found):9.4f}{max(found):9.4f}  '
               f'{wanted}')
-    steps = 20.0 / setup.scheduler.dt_s * len(setup.vehicle_ids)
+    steps = 20.0 / work.setup.scheduler.dt_s * len(work.setup.vehicle_ids)
     plain = statistics.median(times['cut-in game, 20 s, idm [s]'])
     print(f'{steps / plain:,.0f} vehicle steps per second in the game; '
-          f'{len(hashes)} distinct state hash(es) over {3 * rounds} runs')
+          f'{len(work.hashes)} distinct state hash(es) over {3 * rounds} runs')
 
 
 if __name__ == '__main__':

@@ -7,6 +7,7 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import interpolate_angle, wrap_pi, wrap_pi_array
+from crgame_ros.geometry.reference_point import joined
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import PLANNED_REST, StateColumn, VehicleState
 import numpy as np
@@ -49,27 +50,28 @@ class PlanMotion:
         self.states = states
         self.time_step_s = time_step_s
         self._rows: list[list[float]] = states.tolist()
-        steps = np.diff(states[:, :2], axis=0)
+        steps = states[1:, :2] - states[:-1, :2]
         speeds, yaws = states[:, StateColumn.SPEED], states[:, StateColumn.YAW]
-        velocities = (speeds * time_step_s)[:, None] * np.column_stack(
-            (np.cos(yaws), np.sin(yaws)))
+        velocities = (speeds * time_step_s)[:, None] * joined(np.cos(yaws), np.sin(yaws))
         lengths = np.hypot(steps[:, 0], steps[:, 1])
-        ways = np.maximum(np.abs(speeds) * time_step_s, 1e-12)
+        speeds = np.abs(speeds)
+        ways = np.maximum(speeds * time_step_s, 1e-12)
         # When a vehicle moves in a step that begins or ends at rest, as shares of its time: with
         # the mean of both speeds it covers the way in less than the step.
-        resting = np.abs(speeds) <= PLANNED_REST
+        resting = speeds <= PLANNED_REST
         needed = 2.0 * lengths / (ways[:-1] + ways[1:])
         rests = (resting[:-1] != resting[1:]) & (needed < 1.0) & (lengths**2 > RESTING)
         self._spans = np.where(rests, needed, 1.0)
         self._begins = np.where(resting[:-1], 1.0 - self._spans, 0.0)
-        self._motions: list[list[float]] = np.column_stack((self._begins, self._spans)).tolist()
+        self._motions: list[list[float]] = joined(self._begins, self._spans).tolist()
         # Beyond three times the step, a cubic would turn back.
         most, spans = 3.0 * lengths, self._spans[:, None]
         self._starts = spans * velocities[:-1] * np.minimum(
             1.0, most / (self._spans * ways[:-1]))[:, None]
         self._ends = spans * velocities[1:] * np.minimum(
             1.0, most / (self._spans * ways[1:]))[:, None]
-        self._tangents: list[list[float]] = np.column_stack((self._starts, self._ends)).tolist()
+        self._tangents: list[list[float]] = np.concatenate(
+            (self._starts, self._ends), axis=1).tolist()
 
     def __len__(self) -> int:
         """Return the number of planned states."""

@@ -10,6 +10,7 @@ stays exact on maps with large coordinates.
 
 from collections.abc import Sequence
 import math
+from typing import NamedTuple
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectStates
@@ -20,6 +21,22 @@ import numpy as np
 
 # Enclosing circles of objects that barely touch may miss each other by rounding.
 CIRCLE_SLACK = 1e-6
+# Kept back of a distance that nothing can cover before it is measured again, for rounding [m].
+_KEPT_BACK = 1e-3
+
+
+class _Apart(NamedTuple):
+    """
+    A vehicle's place when all objects were measured, and its distance to the nearest one.
+
+    :param since_s: time since the tick then [s]
+    :param gap: between the enclosing circles [m]
+    """
+
+    x: float
+    y: float
+    since_s: float
+    gap: float
 
 
 class CollisionDetector:
@@ -35,8 +52,12 @@ class CollisionDetector:
         self._others = [Footprint(shape) for shape in others]
         count = len(others)
         radii = np.array([footprint.radius for footprint in self._others])
-        self._reach = [np.square(radii + footprint.radius + CIRCLE_SLACK)
-                       for footprint in self._driven]
+        self._reach = [radii + footprint.radius + CIRCLE_SLACK for footprint in self._driven]
+        # By vehicle, since the tick: None before its objects are measured.
+        self._apart: list[_Apart | None] = [None] * len(self._driven)
+        self._fastest = 0.0
+        self._since_s = 0.0
+        self._is_moved = False
         self._poses = np.full((3, count), np.nan)
         self._velocities = np.full((3, count), np.nan)
         self._moved = np.empty((3, count))
@@ -57,12 +78,15 @@ class CollisionDetector:
                 f'{len(self._others)} objects', 'object states', 'give one row of x, y, yaw each')
         self._poses[:] = states.poses.T
         self._velocities[:] = states.velocities.T
+        # fmax ignores NaN, which means absent.
+        self._fastest = float(np.fmax.reduce(
+            np.hypot(self._velocities[0], self._velocities[1]), initial=0.0))
+        self._apart = [None] * len(self._driven)
+        self._is_moved = False
 
     def move(self, seconds_since_tick: float) -> None:
         """Move the other objects on from the tick at their velocities [s]."""
-        if self._others:
-            np.multiply(self._velocities, seconds_since_tick, out=self._moved)
-            self._moved += self._poses
+        self._since_s, self._is_moved = seconds_since_tick, False
 
     def hits(self, centers: Sequence[Pose]
              ) -> tuple[list[list[int]], list[list[int]]]:
@@ -93,13 +117,26 @@ class CollisionDetector:
 
     def _hit_objects(self, index: int, center: Pose) -> list[int]:
         x, y, yaw = center
+        apart = self._apart[index]
+        # In this form, NaN is no proof.
+        if apart is not None and math.hypot(x - apart.x, y - apart.y) \
+                + self._fastest * abs(self._since_s - apart.since_s) < apart.gap:
+            return []
+        if not self._is_moved:
+            np.multiply(self._velocities, self._since_s, out=self._moved)
+            self._moved += self._poses
+            self._is_moved = True
         offset, distance = self._offset, self._distance
         np.subtract(self._moved[0], x, out=offset[0])
         np.subtract(self._moved[1], y, out=offset[1])
         np.multiply(offset, offset, out=offset)
         np.add(offset[0], offset[1], out=distance)
-        np.less_equal(distance, self._reach[index], out=self._near)
-        if not self._near.any() or yaw != yaw:
+        np.sqrt(distance, out=distance)
+        distance -= self._reach[index]
+        np.less_equal(distance, 0.0, out=self._near)
+        gap = float(np.fmin.reduce(distance, initial=math.inf))
+        self._apart[index] = _Apart(x, y, self._since_s, gap - _KEPT_BACK)
+        if not gap <= 0.0 or yaw != yaw:
             return []
         placed = self._driven[index].at(0.0, 0.0, yaw)
         hit = []

@@ -159,6 +159,8 @@ class KeyboardCycles:
         self.cycle = -1
         self._keys = KeyState()
         self._dt_s = 0.0
+        # The filter's state after the present cycle.
+        self._coming = self._filter.state
 
     def command(self, n: int, keys: KeyState, dt_s: float) -> DriverCommand:
         """
@@ -171,7 +173,9 @@ class KeyboardCycles:
         if n > self.cycle:
             # The ramps of CRG 18-19 are clipped lines, so several cycles equal one longer cycle.
             gap = n - self.cycle if self.cycle >= 0 else 0
-            self._filter.advance(self._keys, gap * self._dt_s)
+            self._filter.state = self._coming if gap == 1 else self._filter.advanced(
+                self._filter.state, self._keys, gap * self._dt_s)
             self.cycle = n
         self._keys, self._dt_s = keys, dt_s
-        return self._filter.preview(keys, dt_s)
+        self._coming = self._filter.advanced(self._filter.state, keys, dt_s)
+        return self._filter.command(self._coming)

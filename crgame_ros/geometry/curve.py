@@ -17,6 +17,8 @@ FloatArray = NDArray[np.float64]
 _CHUNK = 2_000_000
 # Up to this many points are refined one by one: numpy calls cost more than the arithmetic.
 _FEW = 12
+# A projection is repeated until points are this close to their normals [m], or this many times.
+_SETTLED, _MOST_ROUNDS = 1e-9, 20
 # Beyond the centre of a bend, s does not run on faster than this allows.
 _LEAST_STRETCH = 0.3
 
@@ -65,6 +67,12 @@ class Curve:
     def directions(self) -> FloatArray:
         """Return unit vectors along the segments, (n - 1, 2)."""
         return np.asarray(np.diff(self.points, axis=0) / self.steps[:, None])
+
+    @cached_property
+    def _segments(self) -> tuple[FloatArray, ...]:
+        """Return x and y of the segments' starts and of their directions, each (n - 1)."""
+        return tuple(np.ascontiguousarray(column) for column in (
+            *self.points[:-1].T, *self.directions.T))
 
     @cached_property
     def _bends(self) -> FloatArray:
@@ -143,33 +151,72 @@ class Curve:
 
     def project(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Find arc lengths and offsets (N), (N) of points (N, 2): the inverse of `poses`."""
+        if len(points) == 1:
+            s, d = self.project_one(*points[0].tolist())
+            return np.array([s]), np.array([d])
         rows = max(1, _CHUNK // len(self.steps))
         if len(points) > rows:
             parts = [self.project(points[i:i + rows]) for i in range(0, len(points), rows)]
             return (np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts]))
-        offset = points[:, None, :] - self.points[None, :-1, :]
-        along = np.einsum('nij,ij->ni', offset, self.directions)
-        inside = np.clip(along, 0.0, self.steps)
-        across = offset[..., 1] * self.directions[:, 0] - offset[..., 0] * self.directions[:, 1]
-        best = np.argmin((along - inside) ** 2 + across ** 2, axis=1)
-        row = np.arange(len(points))
+        best, along = self._nearest_segments(points[:, :1], points[:, 1:])
+        return self._settle(points, self.s[best] + along)
+
+    def project_one(self, x: float, y: float) -> tuple[float, float]:
+        """Find the arc length and the offset of one point [m], bit for bit as `project` does."""
+        best, along = self._nearest_segments(x, y)
+        s = trial = float(self.s[best[0]] + along[0])
+        d, error = 0.0, math.inf
+        for _ in range(_MOST_ROUNDS):
+            _, here_x, here_y, heading, _ = self.place(trial)
+            dx, dy, cos, sin = x - here_x, y - here_y, math.cos(heading), math.sin(heading)
+            ahead = dx * cos + dy * sin
+            if not abs(ahead) < error:
+                break
+            s, d, error = trial, dy * cos - dx * sin, abs(ahead)
+            if not error > _SETTLED:
+                break
+            trial = trial + ahead
+        return s, d
+
+    def _nearest_segments(self, x: FloatArray | float, y: FloatArray | float
+                          ) -> tuple[NDArray[np.intp], FloatArray]:
+        """
+        Return the segments nearest to points, and the points' distances along these.
+
+        :param x: (N, 1), or one number for one point [m]
+        :param y: likewise [m]
+        :return: (N) numbers of segments, and (N), which go on beyond both ends of the curve [m]
+        """
+        begin_x, begin_y, to_x, to_y = self._segments
+        dx, dy = x - begin_x, y - begin_y
+        along = np.atleast_2d(dx * to_x + dy * to_y)
+        inside = np.minimum(np.maximum(along, 0.0), self.steps)
+        # In place: fresh memory takes as long as the arithmetic.
+        dy *= to_x
+        dx *= to_y
+        dy -= dx
+        dy *= dy
+        away = along - inside
+        away *= away
+        away += dy
+        best = away.argmin(axis=1)
         inside[:, 0] = np.minimum(along[:, 0], self.steps[0])
         inside[:, -1] = np.where(along[:, -1] > 0.0, along[:, -1], inside[:, -1])
-        return self._settle(points, self.s[best] + inside[row, best])
+        return best, inside[np.arange(len(best)), best]
 
     def _settle(self, points: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Move s until each point is on the normal of the interpolated heading, or nearest."""
         error = np.full_like(s, np.inf)
         trial = s
         d = np.zeros_like(s)
-        for _ in range(20):
+        for _ in range(_MOST_ROUNDS):
             along, aside = seen_from(self.pose_at(trial), points)
             better = np.abs(along) < error
             s = np.where(better, trial, s)
             d = np.where(better, aside, d)
             error = np.where(better, np.abs(along), error)
             trial = np.where(better, trial + along, s)
-            if not np.any(better & (np.abs(along) > 1e-9)):
+            if not (better & (np.abs(along) > _SETTLED)).any():
                 break
         return s, d
 
@@ -194,9 +241,10 @@ class Curve:
             along, aside = seen_from(pose, points)
             if exact and np.abs(along).max() < exact:
                 break
-            # Beyond the centre of curvature Newton's step would point the wrong way.
-            stretch = np.maximum(1.0 - pose[:, 3] * aside, _LEAST_STRETCH)
-            s = s + along / (stretch if left or exact else 1.0)
+            if left or exact:
+                # Beyond the centre of curvature Newton's step would point the wrong way.
+                along /= np.maximum(1.0 - pose[:, 3] * aside, _LEAST_STRETCH)
+            s = s + along
         return s, aside
 
     def _refine_few(self, points: list[list[float]], s: list[float], rounds: int,

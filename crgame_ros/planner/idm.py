@@ -314,10 +314,13 @@ class IdmPlanner(PathPlanner):
         def acceleration(i: int, s: float, speed: float) -> float:
             if speed < 0.0:
                 return min(model.b, -speed / dt_s)
-            free = free_acceleration(speed, desired[min(max(int(s / step), 0), last)], model)
+            here = int(s / step)
+            here = 0 if here < 0 else last if here > last else here
+            free = free_acceleration(speed, desired[here], model)
             wanted = free + interaction(speed, halt - s - front, 0.0, model)
             for number, leader in enumerate(leaders):
-                wanted = min(wanted, leader.let_in[i])
+                let_in = leader.let_in[i]
+                wanted = let_in if let_in < wanted else wanted
                 behind = leader.center[i] <= s + middle
                 # A vehicle predicted to drive through the ego from behind is no leader.
                 follower[number] = leader.blocking[i] and (behind or follower[number])
@@ -330,7 +333,8 @@ class IdmPlanner(PathPlanner):
                     limit = max(ANTICIPATION_LIMIT, _needed(speed, gap, leader.speed[i]))
                     wanted = min(wanted, max(-limit, free + interaction(
                         speed, gap, leader.speed[i], model)))
-            ahead = min(max(int((s + speed * dt_s) / step), 0), last)
+            ahead = int((s + speed * dt_s) / step)
+            ahead = 0 if ahead < 0 else last if ahead > last else ahead
             bound = (admissible[ahead] - speed) / dt_s
             wanted = min(wanted, max(bound, -2.0 * model.b))
             if speed < STANDING and wanted < START_SHARE * model.a:

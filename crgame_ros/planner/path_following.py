@@ -91,31 +91,34 @@ class PathFollower:
         length = self.correction_length(start, abs(ego.speed))
         gains = (60.0 / length ** 3, 36.0 / length ** 2, 9.0 / length)
         driven = Rollout(ego, dt_s, self._vehicle.wheelbase)
-        position, moved = start, 0.0
+        locate, (s, d, error), moved = self.path.locate, start, 0.0
         for i in range(steps):
             if i:
-                position = self.locate(driven.x, driven.y, driven.yaw, position.s + moved)
+                s, d, heading = locate(driven.x, driven.y, s + moved)
+                error = wrap_pi(driven.yaw - heading)
             speed = driven.speed
-            wanted = longitudinal(i, position.s, speed)
+            wanted = longitudinal(i, s, speed)
             moving_s = moving_time(speed, wanted, dt_s)
             moved = (speed + 0.5 * wanted * moving_s) * moving_s
             driven.step(wanted, self._steering_rate(
-                position, speed, driven.steering, moved, moving_s, gains), moving_s)
+                s, d, error, driven.steering, moved, moving_s, gains), moving_s)
         return driven.states
 
-    def _steering_rate(self, position: PathPosition, speed: float, steering: float, moved: float,
+    def _steering_rate(self, s: float, d: float, error: float, steering: float, moved: float,
                        time_s: float, gains: tuple[float, float, float]) -> float:
-        if abs(moved) < 1e-4 or time_s <= 0.0:
+        """Return the rate at a place as of `PathPosition`, for a step of length `moved` [m]."""
+        if -1e-4 < moved < 1e-4 or time_s <= 0.0:
             return 0.0
-        vehicle = self._vehicle
-        path_curvature = self.path.curvature_at(position.s)
+        vehicle, curvature_at = self._vehicle, self.path.curvature_at
+        path_curvature = curvature_at(s)
         curvature = math.tan(steering) / vehicle.wheelbase
-        cos = max(math.cos(position.heading_error), 0.2)
-        bend = curvature - path_curvature * cos / max(0.3, 1.0 - path_curvature * position.d)
-        third = -(gains[0] * position.d + gains[1] * math.sin(position.heading_error)
-                  + gains[2] * cos * bend)
-        change = self.path.curvature_at(position.s + moved) - path_curvature + third * moved
+        # Comparisons take a third of the time of `min` and `max`.
+        cos, inner = math.cos(error), 1.0 - path_curvature * d
+        cos = cos if cos > 0.2 else 0.2
+        bend = curvature - path_curvature * cos / (inner if inner > 0.3 else 0.3)
+        third = -(gains[0] * d + gains[1] * math.sin(error) + gains[2] * cos * bend)
+        change = curvature_at(s + moved) - path_curvature + third * moved
         limit = vehicle.max_steering_angle
         wanted = math.atan(vehicle.wheelbase * (curvature + change))
-        wanted = min(max(wanted, -limit), limit)
+        wanted = limit if wanted > limit else -limit if wanted < -limit else wanted
         return steering_rate(wanted, steering, time_s, vehicle.max_steering_rate)

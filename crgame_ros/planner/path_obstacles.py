@@ -12,6 +12,7 @@ from crgame_ros.errors import PlanningError
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.polyline import ReferencePath
+from crgame_ros.geometry.reference_point import zero_for_nan
 from crgame_ros.messages.plan import PlanRequest
 import numpy as np
 from numpy.typing import NDArray
@@ -130,7 +131,7 @@ class ObstacleProjector:
         speed = velocity[..., 0] * np.cos(heading) + velocity[..., 1] * np.sin(heading)
         return PathObstacles(
             tuple(request.obstacle_ids[i] for i in near[hit]), rear[:, hit], front[:, hit],
-            s[:, hit], np.nan_to_num(speed), blocking[:, hit])
+            s[:, hit], zero_for_nan(speed), blocking[:, hit])
 
     def _tracks(self, path: ReferencePath, corridor: Corridor,
                 poses: Array) -> tuple[NDArray[np.intp], Array, Array]:
@@ -228,7 +229,7 @@ def _project_tracks(path: ReferencePath, poses: Array, anchors: _Anchors,
         rows = range(len(anchors.steps))
         for here, there in [*pairwise(rows)] + [*pairwise(rows[::-1])]:
             found[there] = np.where(np.isnan(found[there]), found[here], found[there])
-        found = np.nan_to_num(found)
+        found = zero_for_nan(found)
     guess = found[anchors.before] * (1.0 - anchors.share) + found[anchors.after] * anchors.share
     s, d = path.refine(poses[..., :2].reshape(-1, 2), guess.reshape(-1), 1)
     return s.reshape(steps, count), d.reshape(steps, count)
@@ -239,7 +240,7 @@ def _extents(path: ReferencePath, poses: Array, s: Array,
     """Project footprints: least and greatest s, least and greatest d, each (S, K)."""
     corners = placed(outlines, poses)
     shape = corners.shape[:-1]
-    guess = np.broadcast_to(np.nan_to_num(s)[..., None], shape)
+    guess = np.broadcast_to(zero_for_nan(s)[..., None], shape)
     along, across = path.refine(corners.reshape(-1, 2), guess.ravel(), 2)
     along, across = along.reshape(shape), across.reshape(shape)
     return along.min(-1), along.max(-1), across.min(-1), across.max(-1)

@@ -138,7 +138,7 @@ def _check_limits(states: Array, vehicle: VehicleParameters, dt_s: float,
     for what, values, limit, unit in checks:
         excess = values - limit
         # Written so that NaN fails.
-        if not (excess <= 0.0).all():
+        if not np.maximum.reduce(excess) <= 0.0:
             worst = int(excess.argmax())
             first = worst + (len(values) < len(states))
             return f'{what} of {values[worst]:.2f} {unit} at state {first}'

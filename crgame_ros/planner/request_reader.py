@@ -32,6 +32,8 @@ class RequestReader:
         self._names: tuple[str, ...] | None = None
         self._ids: tuple[str, ...] = ()
         self._columns = np.empty((0, 3), dtype=np.intp)
+        # Of the driven vehicles among them: their places, and from the rear axle to the centre.
+        self._driven = np.empty(0, dtype=np.intp)
         self._to_center = np.empty(0)
         self._lights: dict[str, int] = {}
 
@@ -53,9 +55,9 @@ class RequestReader:
                                    series.accelerations[0, :4])
         poses = series.positions[:, self._columns]
         velocities = series.velocities[:, self._columns]
-        driven = self._to_center != 0.0
-        if driven.any():
-            rear, reach = poses[:, driven], self._to_center[driven]
+        driven, reach = self._driven, self._to_center
+        if len(driven):
+            rear = poses[:, driven]
             poses[:, driven] = shifted(rear, reach)
             velocities[:, driven] = shifted_velocities(rear[..., 2], velocities[:, driven], reach)
         shown = ((name, light_of(float(series.positions[0, column])))
@@ -70,7 +72,9 @@ class RequestReader:
         layout = RequestLayout.from_names(names, self._vehicle_id)
         layout.indices({name: number for number, name in enumerate(self._objects)})
         self._ids, self._columns = layout.ids, layout.columns
-        self._to_center = np.array([self._objects[object_id].rear_to_center
-                                    for object_id in layout.ids])
+        to_center = np.array([self._objects[object_id].rear_to_center
+                              for object_id in layout.ids])
+        self._driven = np.flatnonzero(to_center)
+        self._to_center = to_center[self._driven]
         self._lights = light_columns(names)
         self._names = names

@@ -135,8 +135,7 @@ class RoadNetwork:
 
     def locate(self, lanelet_id: int, x: float, y: float) -> tuple[float, float]:
         """Find arc length s and offset d of a point [m]: the inverse of `pose_on`."""
-        s, d = self.line(lanelet_id).project(np.array([[x, y]]))
-        return float(s[0]), float(d[0])
+        return self.line(lanelet_id).project_one(x, y)
 
     def lane_path(self, lanelet_id: int, length: float) -> FloatArray:
         """

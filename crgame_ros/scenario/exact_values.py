@@ -37,8 +37,8 @@ def parts_of(shape: Shape) -> Iterator[Shape]:
         yield shape
 
 
-def group_outline(group: ShapeGroup) -> shapely.Geometry:
-    """Return the union of a group's shapes; commonroad-io's own outline halves circles' radii."""
+def group_outline(group: Shape) -> shapely.Geometry:
+    """Return a group's union, or another shape; commonroad-io's outlines halve circles' radii."""
     return shapely.union_all([
         shapely.Point(shape.center).buffer(shape.radius) if isinstance(shape, Circle)
         else shape.shapely_object for shape in parts_of(group)])

@@ -29,7 +29,7 @@ from crgame_ros.simulation.plan_status import refusal_status
 from crgame_ros.simulation.run_messages import MessageLog, RunMessage
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.publishing import steps_between_messages
-from crgame_ros.vehicle.driver_command import COMMAND_WIDTH, RELEASED
+from crgame_ros.vehicle.driver_command import COMMAND_WIDTH, DriverCommand, RELEASED
 from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
 import numpy as np
 from numpy.typing import NDArray
@@ -336,8 +336,10 @@ class _Trace:
     def __init__(self, setup: Setup, steps: int, check: bool,
                  observers: Sequence[RunObserver]) -> None:
         self.vehicles = np.empty((steps + 1, len(setup.vehicle_ids), STATE_WIDTH))
-        self.commands = np.zeros((steps + 1, len(setup.humans), COMMAND_WIDTH))
-        self.av_commands = np.full((steps + 1, len(setup.avs), COMMAND_WIDTH), np.nan)
+        self._humans, self._avs = len(setup.humans), len(setup.avs)
+        # By step; one conversion at the end takes less time than one for each step.
+        self._commands: list[list[DriverCommand]] = []
+        self._av_commands: list[list[Sequence[float]]] = []
         self.intervals_s = np.full((steps + 1, len(setup.vehicle_ids)), setup.scheduler.dt_s)
         self.objects: list[NDArray[np.float64]] = []
         self.tasks: list[TaskEntry] = []
@@ -358,12 +360,15 @@ class _Trace:
         count = simulation.n + 1
         if log is not None:
             log.add_plans()
+        commands, av_commands = (
+            np.array(rows, dtype=np.float64).reshape(count, width, COMMAND_WIDTH)
+            for rows, width in ((self._commands, self._humans), (self._av_commands, self._avs)))
         return OfflineResult(
             simulation.setup, simulation.state_hash(), self.vehicles[:count],
-            np.array(self.objects), np.array(self.object_velocities), self.commands[:count],
+            np.array(self.objects), np.array(self.object_velocities), commands,
             self.intervals_s[:count], planners,
             () if self._drivability is None else self._drivability.report(), simulation.fired,
-            self.stop, self.av_commands[:count], tuple(self.tasks), simulation.taken_off,
+            self.stop, av_commands, tuple(self.tasks), simulation.taken_off,
             None if log is None else tuple(log.messages))
 
     def add(self, simulation: Simulation, result: StepResult, effective_s: float) -> None:
@@ -375,10 +380,10 @@ class _Trace:
                 self.intervals_s[n, index] = effective_s
         if states := simulation.states:
             self.vehicles[n] = states
-        for index in range(self.commands.shape[1]):
-            self.commands[n, index] = simulation.commands[index] or RELEASED
-        if simulation.avs:
-            self.av_commands[n] = simulation.command_rows[self.commands.shape[1]:]
+        self._commands.append([
+            command or RELEASED for command in simulation.commands[:self._humans]])
+        if self._avs:
+            self._av_commands.append(simulation.command_rows[self._humans:])
         if result.objects is not None:
             self.objects.append(result.objects.poses)
             self.object_velocities.append(result.objects.velocities)

@@ -4,6 +4,7 @@
 
 from array import array
 from collections.abc import Sequence
+from functools import cache
 import math
 
 from crgame_ros.errors import InputError
@@ -31,6 +32,7 @@ _STEADY = _LATE + len(LATE_COLUMNS)
 _COMMANDS = _STEADY + 1
 
 
+@cache
 def lights_alone(lights: int) -> tuple[float, ...]:
     """Return the row of an AV that follows its plan: no command, but visible lights."""
     return tuple(float(lights) if name == 'lights' else math.nan for name in COMMAND_COLUMNS)

@@ -36,19 +36,19 @@ class DriverCommand(NamedTuple):
         The engine does this to every incoming command, so that live, recorded and replayed
         commands are the same bits. A value that is no number counts as released.
         """
-        return DriverCommand(
-            _clip_float32(self.throttle, 0.0), _clip_float32(self.brake, 0.0),
-            _clip_float32(self.steering, -1.0), bool(self.reverse),
-            int(self.lights) & OF_DRIVERS, bool(self.put_back))
+        throttle, brake, steering, reverse, lights, put_back = self
+        throttle, brake, steering = _FLOATS32.unpack(_FLOATS32.pack(
+            _clipped(throttle, 0.0), _clipped(brake, 0.0), _clipped(steering, -1.0)))
+        return DriverCommand(throttle, brake, steering, bool(reverse),
+                             int(lights) & OF_DRIVERS, bool(put_back))
 
 
 RELEASED = DriverCommand()
 COMMAND_WIDTH = len(RELEASED)
-_FLOAT32 = Struct('f')
+_FLOATS32 = Struct('3f')
 
 
-def _clip_float32(value: float, lower: float) -> float:
+def _clipped(value: float, lower: float) -> float:
     if not value == value:
         return 0.0
-    value = min(1.0, max(lower, value))
-    return float(_FLOAT32.unpack(_FLOAT32.pack(value))[0])
+    return min(1.0, max(lower, value))

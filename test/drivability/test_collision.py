@@ -105,6 +105,29 @@ def test_many_objects_at_once_against_shapely() -> None:
         assert detector.hits(own)[1] == truth
 
 
+def test_steps_between_ticks_are_those_of_a_detector_that_knows_nothing() -> None:
+    """What is too far away to be reached since it was measured is not measured again."""
+    random = np.random.default_rng(8)
+    shapes = [SHAPES['pedestrian'], CAR, SHAPES['truck']]
+    detector, hits = CollisionDetector([CAR, CAR], shapes), []
+    for _ in range(200):
+        poses = random.uniform((-12, -12, -4), (12, 12, 4), (3, 3))
+        objects = ObjectStates(poses, random.uniform(-80, 80, (3, 3)))
+        objects.poses[random.random(3) < 0.2] = math.nan
+        detector.set_objects(objects)
+        own = random.uniform((-12, -12, -4), (12, 12, 4), (2, 3))
+        ways = random.uniform(-80, 80, (2, 3)) * (random.random() < 0.5)
+        for since_s in np.linspace(0.0, 0.1, 11).tolist():
+            places = [tuple(row) for row in (own + since_s * ways).tolist()]
+            fresh = CollisionDetector([CAR, CAR], shapes)
+            fresh.set_objects(objects)
+            for each in (detector, fresh):
+                each.move(since_s)
+            hits.append(detector.hits(places)[1])
+            assert hits[-1] == fresh.hits(places)[1]
+    assert 100 < sum(map(any, hits)) < len(hits) - 100
+
+
 def test_obstacle_hits_between_two_ticks() -> None:
     """
     A crossing pedestrian of 0.35 m at 40 m/s is beside the car at both ticks and in it between.

@@ -139,6 +139,18 @@ def test_many_points_are_projected_as_few(monkeypatch: pytest.MonkeyPatch) -> No
     assert np.array_equal(curve.project(points), whole)
 
 
+def test_one_point_is_projected_to_the_last_bit_as_among_equal_ones() -> None:
+    """Points at random, at vertices, where segments tie, beyond the ends, and a missing one."""
+    random = np.random.default_rng(5)
+    curve, missing = Curve.from_polyline(zigzag()), [[math.nan, 0.0]]
+    points = np.concatenate((random.uniform((-20.0, -9.0), (80.0, 9.0), (200, 2)), curve.points,
+                             missing))
+    for point in points:
+        s, d = curve.project(np.tile(point, (2, 1)))
+        np.testing.assert_array_equal(np.array(curve.project_one(*point.tolist())),
+                                      (s[0], d[0]))
+
+
 @pytest.mark.parametrize(('rounds', 'exact'), [(3, 0.0), (1, 0.0), (19, 1e-11)])
 @pytest.mark.parametrize('make', [Curve.from_polyline, ReferencePath.from_polyline])
 def test_few_points_are_refined_to_the_last_bit_as_many(

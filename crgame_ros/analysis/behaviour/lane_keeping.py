@@ -32,10 +32,12 @@ class LaneCrossing(NamedTuple):
 
     :param tlc_s: time at constant speed and yaw rate.
     :param linear_s: time from the distance to the boundary and the speed towards it.
+    :param beyond: (K) how far the outermost wheel is beyond a boundary; below 0 inside [m]
     """
 
     tlc_s: FloatArray
     linear_s: FloatArray
+    beyond: FloatArray
 
 
 def lane_crossing(strip: LaneStrip, wheels: FloatArray, rear: FloatArray, speed: FloatArray,
@@ -49,10 +51,11 @@ def lane_crossing(strip: LaneStrip, wheels: FloatArray, rear: FloatArray, speed:
     :param speed: (K) signed [m/s]
     :param yaw_rate: (K) [rad/s]
     """
-    outside = np.asarray(strip.beyond(wheels).max(axis=(1, 2)) > 0.0)
     velocities = _velocities(wheels, rear, speed, yaw_rate)
-    linear = np.minimum(_linear(strip.left, 1.0, wheels, velocities),
-                        _linear(strip.right, -1.0, wheels, velocities))
+    left, left_s = _to_boundary(strip.left, 1.0, wheels, velocities)
+    right, right_s = _to_boundary(strip.right, -1.0, wheels, velocities)
+    beyond, linear = np.maximum(left, right), np.minimum(left_s, right_s)
+    outside = beyond > 0.0
     starts = np.concatenate((strip.left.points[:-1], strip.right.points[:-1]))
     ends = np.concatenate((strip.left.points[1:], strip.right.points[1:]))
     held = np.array([
@@ -60,7 +63,7 @@ def lane_crossing(strip: LaneStrip, wheels: FloatArray, rear: FloatArray, speed:
         for out, spots, pose, v, rate in zip(outside, wheels, rear, speed.tolist(),
                                              yaw_rate.tolist(), strict=True)])
     return LaneCrossing(_within_horizon(held),
-                        _within_horizon(np.where(outside, 0.0, linear)))
+                        _within_horizon(np.where(outside, 0.0, linear)), beyond)
 
 
 def first_crossing(wheels: FloatArray, rear: FloatArray, speed: float, yaw_rate: float,
@@ -111,22 +114,30 @@ def _around(to_start: FloatArray, chord: FloatArray, arm: FloatArray, yaw_rate: 
     first = math.inf
     with np.errstate(divide='ignore', invalid='ignore'):
         for share in (q / square, rest / q):
-            away = to_start + share[..., None] * chord
-            turn = np.arctan2(_cross(arm, away), _dot(arm, arm + away))
-            times = (turn * math.copysign(1.0, yaw_rate)) % (2.0 * math.pi) / abs(yaw_rate)
+            # A wheel crosses few of the segments: only these need the angle.
             hit = (discriminant >= 0.0) & (share >= 0.0) & (share <= 1.0)
-            first = min(first, float(np.min(times, where=hit, initial=math.inf)))
+            from_center = arm[hit]
+            away = to_start[hit] + share[hit][:, None] * chord[hit]
+            turn = np.arctan2(_cross(from_center, away), _dot(from_center, from_center + away))
+            times = (turn * math.copysign(1.0, yaw_rate)) % (2.0 * math.pi) / abs(yaw_rate)
+            first = min(first, float(times.min(initial=math.inf)))
     return first
 
 
-def _linear(line: Curve, side: float, wheels: FloatArray, velocities: FloatArray) -> FloatArray:
-    """Return the least time (K) of the wheels to the left (1) or right (-1) boundary [s]."""
+def _to_boundary(line: Curve, side: float, wheels: FloatArray,
+                 velocities: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """
+    Return how far the outermost wheel is beyond a boundary, and the least time of a wheel to it.
+
+    :param side: the left (1) or the right (-1) boundary.
+    :return: both (K) [m], [s]
+    """
     s, d = (each.reshape(wheels.shape[:2]) for each in line.project(wheels.reshape(-1, 2)))
     heading = line.heading_at(s)
     towards = side * (velocities[..., 1] * np.cos(heading) - velocities[..., 0] * np.sin(heading))
     with np.errstate(divide='ignore', invalid='ignore'):
         times = np.where(towards > 0.0, -side * d / towards, math.inf)
-    return np.asarray(times.min(axis=1))
+    return (side * d).max(axis=1), times.min(axis=1)
 
 
 def _velocities(wheels: FloatArray, rear: FloatArray, speed: FloatArray,
@@ -230,8 +241,7 @@ def keep_lane(roads: RoadNetwork, states: FloatArray, vehicle: VehicleParameters
         turn = rear[rows, 2] - strip.center.heading_at(s)
         sideways[rows] = speed[rows] * np.sin(turn) \
             + yaw_rate[rows] * vehicle.rear_to_center * np.cos(turn)
-        beyond[rows] = strip.beyond(wheels[rows]).max(axis=(1, 2))
-        tlc[rows], linear[rows] = lane_crossing(
+        tlc[rows], linear[rows], beyond[rows] = lane_crossing(
             strip, wheels[rows], rear[rows], speed[rows], yaw_rate[rows])
     changes = _changes(visits, strips, centers, wheels, sideways, round(LONGEST_HALF_S / step_s))
     return LaneKeeping(visits, strips, offset, beyond, tlc, linear, changes)

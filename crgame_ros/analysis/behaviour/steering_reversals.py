@@ -87,6 +87,7 @@ def reversal_rate(pieces: Sequence[FloatArray], dt_s: float, setting: ReversalSe
     long = [piece for piece in pieces if len(piece) * dt_s >= SHORTEST_S and len(piece) > 9]
     if not long or setting.cutoff_hz >= 0.5 / dt_s:
         return math.nan
+    # A wheel that never turns has no reversals; its run then needs no filter, which takes seconds.
     count = sum(count_reversals(stationary_points(smoothed(piece, dt_s, setting.cutoff_hz)),
-                                setting.gap_deg) for piece in long)
+                                setting.gap_deg) for piece in long if piece.min() < piece.max())
     return 60.0 * count / (dt_s * sum(len(piece) - 1 for piece in long))

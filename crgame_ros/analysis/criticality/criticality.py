@@ -29,7 +29,11 @@ from crgame_ros.analysis.criticality.own_path import OwnPaths
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.curve import Curve
-from crgame_ros.geometry.reference_point import shifted, shifted_velocities
+from crgame_ros.geometry.reference_point import (
+    shifted,
+    shifted_velocities,
+    zero_for_nan,
+)
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import goal_lanelets
 from crgame_ros.simulation.observer import ObservedRun
@@ -330,7 +334,7 @@ class Criticality:
         result = np.zeros_like(moves)
         if self._before is not None and time_s > self._before[0]:
             lapse = time_s - self._before[0]
-            result = np.nan_to_num((moves - self._before[1]) / lapse)
+            result = zero_for_nan((moves - self._before[1]) / lapse)
         own, yaw = states[:, StateColumn.ACCELERATION], poses[:self.vehicles, 2]
         result[:self.vehicles] = own[:, None] * np.column_stack((np.cos(yaw), np.sin(yaw)))
         self._before = (time_s, moves)
@@ -380,10 +384,12 @@ class Criticality:
         for tick in self.latest:
             found = self._found[tick.subject]
             values, others = (each.tolist() for each in tick.worst())
-            for name, value, other in zip(MEASURES, values, others, strict=True):
+            for (name, measure), value, other in zip(
+                    MEASURES.items(), values, others, strict=True):
+                if other < 0:
+                    continue
                 known = found.worst.get(name)
-                if other >= 0 and (known is None
-                                   or MEASURES[name].worst * (value - known.value) > 0.0):
+                if known is None or measure.worst * (value - known.value) > 0.0:
                     found.worst[name] = Worst(value, self.ids[other], time_s)
             found.headways.add(tick.following, values[COLUMN['ttc']])
             for name, exposure in EXPOSURES.items():

@@ -39,14 +39,21 @@ class OwnPath(NamedTuple):
     @classmethod
     def along(cls, points: FloatArray) -> 'OwnPath':
         """Build the path from a polyline (n, 2) [m]."""
-        return cls(Curve.from_polyline(points), resample(points, SPACING))
+        # By columns, as distances to all of them read them.
+        return cls(Curve.from_polyline(points), np.asfortranarray(resample(points, SPACING)))
 
     def near(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the distances (N) of positions (N, 2) to the nearest samples, and their s [m]."""
         row = nearest(positions, self.samples)
-        scale = self.line.length / (len(self.samples) - 1)
-        dx, dy = (positions - self.samples[row]).T
-        return np.asarray(np.sqrt(dx ** 2 + dy ** 2)), scale * row.astype(np.float64)
+        dx, dy = (positions - self.samples.take(row, 0)).T
+        return np.asarray(np.sqrt(dx * dx + dy * dy)), self._lengths_to(row)
+
+    def guess(self, positions: FloatArray) -> FloatArray:
+        """Return the arc lengths of the samples nearest to positions (N, 2), (N) [m]."""
+        return self._lengths_to(nearest(positions, self.samples))
+
+    def _lengths_to(self, row: NDArray[np.intp]) -> FloatArray:
+        return self.line.length / (len(self.samples) - 1) * row.astype(np.float64)
 
     def refined(self, positions: FloatArray, guess: FloatArray) -> tuple[FloatArray, FloatArray]:
         """

@@ -8,16 +8,21 @@ from typing import NamedTuple
 
 from commonroad.common.solution import vehicle_parameters, VehicleType
 from commonroad.planning.planning_problem import PlanningProblem
-from commonroad.scenario.state import KSState, PMState
+from commonroad.scenario.state import KSState, PMState, TraceState
 from commonroad.scenario.trajectory import Trajectory
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.recording.run_trajectories import RunTrajectories
+from crgame_ros.scenario.exact_values import group_outline
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import StateColumn
+import numpy as np
+from numpy.typing import NDArray
 
 # Dimensions that differ by no more are equal [m].
 _SAME = 1e-6
+# Around the box of a goal's area, for rounding [m].
+_BOX_MARGIN = 0.1
 
 
 class ChosenType(NamedTuple):
@@ -92,10 +97,21 @@ def goal_step(problem: PlanningProblem, states: Sequence[KSState | PMState]) -> 
     """Find the first state that meets the goal; None without one."""
     if not problem.goal.state_list:
         return None
-    for number, state in enumerate(states):
-        if is_reached(problem, state):
-            return number
-    return None
+    positions = np.array([state.position for state in states])
+    # CommonRoad's test copies the goal for each state, which takes a fifth of a millisecond.
+    near = np.any([_is_near(goal, positions) for goal in problem.goal.state_list], axis=0)
+    return next((number for number in np.flatnonzero(near).tolist()
+                 if is_reached(problem, states[number])), None)
+
+
+def _is_near(goal: TraceState, positions: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which positions (K, 2) may be in a goal's area: those in the box around it."""
+    if getattr(goal, 'position', None) is None:
+        return np.ones(len(positions), dtype=bool)
+    x_min, y_min, x_max, y_max = group_outline(goal.position).bounds
+    low, high = np.array((x_min, y_min)), np.array((x_max, y_max))
+    return np.asarray(((positions >= low - _BOX_MARGIN)
+                       & (positions <= high + _BOX_MARGIN)).all(axis=1))
 
 
 def is_reached(problem: PlanningProblem, state: KSState | PMState) -> bool:

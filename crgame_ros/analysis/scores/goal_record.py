@@ -5,7 +5,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from commonroad.geometry.shape import ShapeGroup
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.state import KSState
 from crgame_ros.analysis.scores.driven_states import goal_step
@@ -19,12 +18,14 @@ class GoalRecord:
     """
     A vehicle's way to its goal.
 
+    :param step: number of the first state that met the goal; None: none did.
     :param reached_s: time at which a state first met the goal, since the run's start; None: never
         [s]
     :param last_distance: from the centre to the goal's area at the end; None: it has no area [m]
     :param least_distance: smallest such distance of the run [m]
     """
 
+    step: int | None
     reached_s: float | None
     last_distance: float | None
     least_distance: float | None
@@ -43,13 +44,9 @@ def find_goal(problem: PlanningProblem, states: Sequence[KSState], dt_s: float) 
     """
     step = goal_step(problem, list(states))
     points = shapely.points([state.position for state in states])
-    areas = [_area(state.position) for state in problem.goal.state_list
+    areas = [group_outline(state.position) for state in problem.goal.state_list
              if getattr(state, 'position', None) is not None]
     away = np.min([shapely.distance(points, area) for area in areas], axis=0) if areas else None
-    return GoalRecord(None if step is None else step * dt_s,
+    return GoalRecord(step, None if step is None else step * dt_s,
                       None if away is None else float(away[-1]),
                       None if away is None else float(away.min()))
-
-
-def _area(position: object) -> shapely.Geometry:
-    return group_outline(position if isinstance(position, ShapeGroup) else ShapeGroup([position]))

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Progress of a vehicle along a route, compared with that of another drive along it."""
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -68,20 +69,20 @@ class ComparedRoute:
         A point counts if it is in the part of the previous point, or in a later one. Points off
         the route add no progress.
         """
-        index = 0
-        first: float | None = None
-        last: float | None = None
         inside = np.array([shapely.intersects_xy(block.area, points[:, 0], points[:, 1])
                            for block in self._blocks])
-        for row in range(len(points)):
-            found = np.flatnonzero(inside[index:, row])
-            if not len(found):
-                continue
-            index += int(found[0])
-            block = self._blocks[index]
-            last = block.start + self._roads.locate(block.lanelet, *points[row].tolist())[0]
-            first = last if first is None else first
-        return 0.0 if last is None or first is None else last - first
+        index = 0
+        counted: list[tuple[_Block, int]] = []
+        for row, there in enumerate(inside.T.tolist()):
+            if True in there[index:]:
+                index = there.index(True, index)
+                counted.append((self._blocks[index], row))
+        if not counted:
+            return 0.0
+        first, last = (
+            block.start + self._roads.locate(block.lanelet, *points[row].tolist())[0]
+            for block, row in (counted[0], counted[-1]))
+        return last - first
 
     def way_to(self, point: FloatArray) -> float | None:
         """Return the arc length of a point (2) along the route; None beside it [m]."""
@@ -102,14 +103,14 @@ class ComparedRoute:
         """
         if not self._blocks:
             return 0.0
-        starts = np.array([block.start for block in self._blocks])
+        starts = [block.start for block in self._blocks]
         limits = [self._roads.speed_limit(block.lanelet) or UNLIMITED for block in self._blocks]
         end = min(end, self._blocks[-1].start
                   + self._roads.line(self._blocks[-1].lanelet).length)
         place, now_s = start, 0.0
         while now_s < duration_s - 1e-9 and place < end:
             step_s = min(_FREE_STEP_S, duration_s - now_s)
-            part = max(int(np.searchsorted(starts, place, side='right')) - 1, 0)
+            part = max(bisect_right(starts, place) - 1, 0)
             speed = min(speed, limits[part])
             then = min(speed + FREE_ACCELERATION * step_s, limits[part])
             place += 0.5 * (speed + then) * step_s

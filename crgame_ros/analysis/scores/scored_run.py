@@ -10,7 +10,6 @@ from commonroad.common.solution import CostFunction, PlanningProblemSolution, Ve
 from crgame_ros.analysis.scores.driven_states import (
     choose_type,
     driven_states,
-    goal_step,
     until_goal,
 )
 from crgame_ros.analysis.scores.goal_record import find_goal
@@ -63,7 +62,8 @@ def _judged(log: RunTrajectories, number: int, drive: VehicleScores, problem_id:
     chosen = choose_type(log.game.vehicles[number].vehicle)
     states = driven_states(log, number, chosen.kind)
     problem = scored.problem(problem_id)
-    trajectory = until_goal(states, goal_step(problem, states))
+    goal = find_goal(problem, states, log.game.scheduler.time_step_s)
+    trajectory = until_goal(states, goal.step)
     solved = PlanningProblemSolution(problem_id, VehicleModel.KS, chosen.kind, CostFunction.JB1,
                                      trajectory)
     remarks = () if chosen.is_exact else (
@@ -72,5 +72,4 @@ def _judged(log: RunTrajectories, number: int, drive: VehicleScores, problem_id:
     return replace(
         drive, commonroad=judge.judge(solved, trajectory, exact_type=chosen.is_exact,
                                       progress=progress),
-        goal=find_goal(problem, states, log.game.scheduler.time_step_s),
-        remarks=(*remarks, *drive.remarks))
+        goal=goal, remarks=(*remarks, *drive.remarks))

@@ -81,7 +81,8 @@ def test_where_there_is_no_crossing(vehicle: VehicleParameters) -> None:
     assert math.isinf(_crossing(lane, vehicle, (0.0, 0.0, 0.0), 30.0, 0.0).tlc_s[0])
     slow = 0.5 * HALF / HORIZON_S / 0.05
     assert math.isinf(_crossing(lane, vehicle, (0.0, 0.0, 0.05), 0.5 * slow, 0.0).tlc_s[0])
-    assert _crossing(lane, vehicle, (0.0, 1.0, 0.0), 30.0, 0.0) == (0.0, 0.0)
+    assert _crossing(lane, vehicle, (0.0, 1.0, 0.0), 30.0, 0.0) == (
+        0.0, 0.0, pytest.approx(1.0 + 0.5 * vehicle.width - HALF))
     back = _crossing(lane, vehicle, (0.0, 0.0, 0.1), -5.0, 0.0)
     expected = (HALF - 0.5 * vehicle.width * math.cos(0.1)) / (5.0 * math.sin(0.1))
     assert back.tlc_s[0] == pytest.approx(expected, rel=1e-9)
