@@ -144,7 +144,7 @@ def main() -> int:
     sessions = {}
     with made_gaze():
         for name in PEOPLE:
-            kills = sorted((draw.uniform(25.0, 70.0), victim) for victim in KILLS[name])
+            kills = sorted((draw.uniform(12.0, 40.0), victim) for victim in KILLS[name])
             with study_session(file, out, name, 8300,
                                address if name == ELSEWHERE else None) as session:
                 conduct(session, kills, log)

@@ -16,7 +16,7 @@ from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.study.answer_condition import AnswerCondition, AnswerTest
 from crgame_ros.study.file import Break, DeviceCheck, Page, Questions, StudyFile
-from crgame_ros.study.followed_session import judging_question
+from crgame_ros.study.followed_session import judged_by, judging_question
 from crgame_ros.study.local_text import LocalText
 from crgame_ros.study.pages import page_file, questionnaire_name, steps_of
 from crgame_ros.study.question import ChoiceQuestion, Question
@@ -82,7 +82,7 @@ def check_study(study: StudyFile,
     :param progress: called with the share that is done, 0 to 1.
     """
     found = [*_steps(study), *_conditions_on_answers(study), *_together(study),
-             *_staircases(study), *_balance(study)]
+             *_successes(study), *_balance(study)]
     drives = list(drives_of(study))
     tasks: set[str] = set()
     for number, (name, settings) in enumerate(drives):
@@ -221,10 +221,10 @@ def _conditions_on_answers(study: StudyFile) -> Iterator[StudyFinding]:
             yield StudyFinding('error', f'exclude[{number}]: no question has an expected answer')
 
 
-def _staircases(study: StudyFile) -> Iterator[StudyFinding]:
-    """Yield why no trial of a staircase can be a success."""
+def _successes(study: StudyFile) -> Iterator[StudyFinding]:
+    """Yield why no trial of a block that is ruled by successes can be one."""
     for block in study.blocks:
-        if block.staircase is None:
+        if block.judged is None:
             continue
         try:
             judging = judging_question(study, block)
@@ -232,8 +232,8 @@ def _staircases(study: StudyFile) -> Iterator[StudyFinding]:
             yield StudyFinding('error', str(error))
             continue
         if judging is not None:
-            where = f'blocks: {block.name}: staircase: success'
-            yield from _impossible(where, block.staircase.success, judging[1])
+            where = f'blocks: {block.name}: {judged_by(block)}: success'
+            yield from _impossible(where, block.judged, judging[1])
             if not judging[1].required:
                 yield StudyFinding('warning', f'{where}: "{judging[1].name}" may be left open: '
                                               'such a trial counts for nothing')

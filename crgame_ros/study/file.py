@@ -20,6 +20,7 @@ from crgame_ros.study.question import check_conditions, Question
 from crgame_ros.study.retention import Retention
 from crgame_ros.study.screening import Exclusion
 from crgame_ros.study.staircase import Staircase
+from crgame_ros.study.success import StopRule, Success
 from crgame_ros.study.trial_order import OrderKind
 from crgame_ros.study.trial_settings import Factor, NOTHING, TrialSettings
 from crgame_ros.yaml_text import read_yaml
@@ -145,6 +146,7 @@ class Block:
     :param sequences: lists of conditions, `level` or `level/level`, assigned to participants in
         turn instead.
     :param staircase: by which answers decide on the level of the next trial, instead of an order.
+    :param stop: by which it ends before its last trial.
     :param settings: of its trials, besides those of the study.
     :param practice: before its first trial.
     :param before: steps before it.
@@ -162,6 +164,7 @@ class Block:
     order: OrderKind = 'williams'
     sequences: Annotated[tuple[tuple[str, ...], ...], Listed(noun='sequence')] = ()
     staircase: Staircase | None = None
+    stop: StopRule | None = None
     settings: TrialSettings = NOTHING
     practice: Practice | None = None
     before: Steps = ()
@@ -176,6 +179,15 @@ class Block:
                 self.repetitions > 1 or self.order != 'williams' or self.sequences):
             raise InputError('has a staircase, and repetitions or an order of its conditions', '',
                              'leave out repetitions, order and sequences')
+        if self.staircase is not None and self.stop is not None:
+            raise InputError('has a staircase, which ends by its own rule', 'stop',
+                             'leave it out, or give it to the staircase')
+
+    @property
+    def judged(self) -> Success | None:
+        """Return what makes its trials a success; None if nothing depends on that."""
+        rule = self.staircase or self.stop
+        return None if rule is None else rule.success
 
 
 @dataclass(frozen=True)
@@ -294,6 +306,11 @@ class StudyFile:
                 raise InputError(f'names the field "{name}", which is not there',
                                  f'exclude[{number}]',
                                  f'name {", ".join(sorted(known)) or "none"}')
+
+    @property
+    def is_adaptive(self) -> bool:
+        """Return whether the length of a session depends on successes."""
+        return any(block.judged is not None for block in self.blocks)
 
     @property
     def has_staircases(self) -> bool:

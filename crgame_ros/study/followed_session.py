@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The items of a session whose staircases follow the answers in its journal."""
+"""The items of a session whose staircases and ends of blocks follow the answers so far."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,16 +19,20 @@ from crgame_ros.study.trial_plan import BlockStaircases, PlannedTrial
 Entries = Sequence[Mapping[str, Any]]
 
 
+def judged_by(block: Block) -> str:
+    """Return the key of a block that makes its trials successes or failures."""
+    return 'stop' if block.staircase is None else 'staircase'
+
+
 def judging_question(study: StudyFile, block: Block) -> tuple[int, Question] | None:
     """
-    Return the question that judges each trial of a staircase, and the number of its step.
+    Return the question that judges each trial of a block, and the number of its step.
 
     :return: the step's number after each trial, from 1 on; None if the drive is judged.
     :raises InputError: if no question of this name follows every trial, or several do.
     """
-    assert block.staircase is not None
-    success, where = block.staircase.success, f'blocks: {block.name}: staircase: success'
-    if success.question is None:
+    success, where = block.judged, f'blocks: {block.name}: {judged_by(block)}: success'
+    if success is None or success.question is None:
         return None
     found, known = [], []
     for number, entry in enumerate(block.after_trial):
@@ -66,7 +70,7 @@ class FollowedSession:
 def followed(study: StudyFile, place: int, group: str, planned: Sequence[SessionItem],
              entries: Entries) -> FollowedSession:
     """
-    Follow the staircases of a session.
+    Follow the staircases of a session, and the rules by which its blocks end.
 
     It depends on nothing but its parameters.
 
@@ -79,13 +83,19 @@ def followed(study: StudyFile, place: int, group: str, planned: Sequence[Session
     tracks: dict[tuple[str, str], Track] = {}
     needed: dict[str, dict[int, PlannedTrial]] = {}
     for block in study.blocks:
-        first = next((item.what for item in planned if isinstance(item.what, PlannedTrial)
-                      and item.what.block == block.name), None)
-        if block.staircase is None or first is None:
+        of_block = [item.what for item in planned if isinstance(item.what, PlannedTrial)
+                    and item.what.block == block.name]
+        if not of_block:
+            continue
+        if block.stop is not None:
+            judged = _judged(study, block, entries)
+            end = block.stop.ends_after(judged.get(trial.place) for trial in of_block)
+            needed[block.name] = {trial.place: trial for trial in of_block[:end]}
+        if block.staircase is None:
             continue
         staircases = BlockStaircases(study, block, group)
         found, trials = staircases.follow(place, _told(study, block, staircases, entries),
-                                          first.number - 1)
+                                          of_block[0].number - 1)
         tracks |= {(block.name, name): track for name, track in found.items()}
         needed[block.name] = {trial.place: trial for trial in trials}
     if not needed:
@@ -108,45 +118,55 @@ def _items(planned: Iterable[SessionItem],
                 yield item
 
 
-def _told(study: StudyFile, block: Block, staircases: BlockStaircases,
-          entries: Entries) -> dict[int, ToldTrial]:
-    """Return what the journal tells of a block's trials, by their places."""
-    assert block.staircase is not None
-    success, judging = block.staircase.success, judging_question(study, block)
-    started: dict[str, Any] = {}
-    driven: dict[str, tuple[int, int]] = {}
+def _judged(study: StudyFile, block: Block, entries: Entries) -> dict[int, bool | None]:
+    """
+    Return whether trials of a block that are done were a success, by their places.
+
+    None is for those that count for nothing: they were left out, or the answer was.
+    """
+    success, judging = block.judged, judging_question(study, block)
+    assert success is not None
     done: dict[str, Mapping[str, Any]] = {}
     for entry in entries:
         item = entry.get('item') or ''
-        if not item.startswith(f'{block.name}/'):
-            continue
-        kind = entry['entry']
-        if kind == SessionEvent.STARTED:
-            started[item] = entry.get('condition')
-        elif kind == SessionEvent.REPEATED:
+        if entry['entry'] == SessionEvent.REPEATED:
             done.pop(item, None)
-        elif kind in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
+        elif entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
             done[item] = entry
-            # A drive that did not finish has not decided anything: its level follows anew.
-            if kind == SessionEvent.FINISHED and started.get(item) is not None:
-                at = staircases.find(started[item])
-                if at is None:
-                    raise InputError(f'tells of the condition "{started[item][:60]}", which is '
-                                     'not in the block', item, 'put back the study file that '
-                                     'the session was run with')
-                driven[item] = at
-    told = {}
-    for place in range(1, staircases.most + 1):
-        name = f'{block.name}/{place}'
-        entry = done.get(name, {})
-        good = None
-        if entry.get('entry') == SessionEvent.FINISHED:
-            if judging is None:
-                value = entry.get(success.drive or '')
-            else:
-                value = (done.get(f'{name}/after/{judging[0]}', {}).get('answers') or {}).get(
+    found = {}
+    for name, entry in done.items():
+        of_block, _, number = name.partition('/')
+        if of_block != block.name or not number.isdecimal():
+            continue
+        value = None
+        if entry['entry'] == SessionEvent.FINISHED:
+            value = entry.get(success.drive or '') if judging is None else (
+                done.get(f'{name}/after/{judging[0]}', {}).get('answers') or {}).get(
                     success.question)
-            good = None if value in (None, []) else success.holds(value)
-        if name in done or name in driven:
-            told[place] = ToldTrial(driven.get(name), good, name in done)
-    return told
+        found[int(number)] = None if value in (None, []) else success.holds(value)
+    return found
+
+
+def _told(study: StudyFile, block: Block, staircases: BlockStaircases,
+          entries: Entries) -> dict[int, ToldTrial]:
+    """Return what the journal tells of the trials of a block with staircases."""
+    started: dict[str, Any] = {}
+    driven: dict[int, tuple[int, int]] = {}
+    for entry in entries:
+        item = entry.get('item') or ''
+        of_block, _, number = item.partition('/')
+        if of_block != block.name or not number.isdecimal():
+            continue
+        if entry['entry'] == SessionEvent.STARTED:
+            started[item] = entry.get('condition')
+        elif entry['entry'] == SessionEvent.FINISHED and started.get(item) is not None:
+            # A drive that did not finish has not decided anything: its level follows anew.
+            at = staircases.find(started[item])
+            if at is None:
+                raise InputError(f'tells of the condition "{started[item][:60]}", which is '
+                                 'not in the block', item, 'put back the study file that '
+                                 'the session was run with')
+            driven[int(number)] = at
+    judged = _judged(study, block, entries)
+    return {place: ToldTrial(driven.get(place), judged.get(place), place in judged)
+            for place in sorted(driven.keys() | judged.keys()) if place <= staircases.most}

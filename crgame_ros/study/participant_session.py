@@ -60,7 +60,7 @@ class ParticipantSession:
         for name in study.group_names:
             session_of(study, 0, name)
         for block in study.blocks:
-            if block.staircase is not None:
+            if block.judged is not None:
                 judging_question(study, block)
         self._planned: tuple[SessionItem, ...] = ()
         # The number of entries that the items follow from, and the items.

@@ -113,10 +113,10 @@ def members_of(study: StudyFile) -> int:
     if counts[one] > 1 and study.groups is not None:
         raise InputError('is for participants who drive alone', 'groups',
                          'leave out "groups", or "seats"')
-    stepped = next((block.name for block in study.blocks if block.staircase is not None), None)
-    if counts[one] > 1 and stepped is not None:
-        raise InputError('has a staircase, which answers of one participant decide on',
-                         f'blocks: {stepped}', 'leave out "staircase", or "seats"')
+    judged = next((block.name for block in study.blocks if block.judged is not None), None)
+    if counts[one] > 1 and judged is not None:
+        raise InputError('is ruled by successes, which are those of one participant',
+                         f'blocks: {judged}', 'leave out "staircase" and "stop", or "seats"')
     return counts[one]
 
 

@@ -12,55 +12,12 @@ from typing import Annotated, ClassVar, Literal
 from crgame_ros.errors import InputError
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Within, Wording
-from crgame_ros.study.answer_condition import AnswerTest
 from crgame_ros.study.names import ColumnName, Name
+from crgame_ros.study.success import Success
 from crgame_ros.study.trial_settings import Factor
 
 _SEE = 'see docs/studies.md for the keys'
-OUTCOMES = ('time', 'collision', 'off_road')
 EndReason = Literal['reversals', 'at_most']
-
-
-@dataclass(frozen=True)
-class Success(AnswerTest):
-    """
-    What makes a trial a success: an answer after it, or a value of its drive.
-
-    :param question: name of a question that follows every trial of the block.
-    :param questionnaire: name of its questionnaire, if several that follow have this question.
-    :param drive: instead of a question: how the drive ended, or a number of the vehicle's contacts
-        or departures from the road.
-    """
-
-    FORM: ClassVar[Form] = Form(_SEE)
-
-    question: ColumnName | None = None
-    questionnaire: ColumnName | None = None
-    drive: Literal['outcome', 'contacts', 'departures'] | None = None
-
-    def check(self) -> None:
-        """Refuse a success of nothing, of two things, without a test, or that never comes."""
-        if (self.question is None) == (self.drive is None):
-            raise InputError('has not one of "question" and "drive"', '', 'give exactly one')
-        if self.questionnaire is not None and self.question is None:
-            raise InputError('has "questionnaire" without "question"', '', 'give both')
-        super().check()
-        if self.drive == 'outcome' and not (
-                self.values and all(value in OUTCOMES for value in self.values)):
-            raise InputError('tests no outcome of a drive', '',
-                             f'give equals or one_of with {", ".join(OUTCOMES)}')
-        if self.drive in ('contacts', 'departures') and not all(
-                type(value) in (int, float) for value in self.values):
-            raise InputError(f'tests {self.drive}, which are numbers, by something else', '',
-                             'give numbers')
-
-    @property
-    def told(self) -> str:
-        """Return it in words."""
-        if self.drive is not None:
-            return self.text_of(f'{self.drive} of the drive')
-        return self.text_of((f'{self.questionnaire}.' if self.questionnaire else '')
-                            + str(self.question))
 
 
 @dataclass(frozen=True)

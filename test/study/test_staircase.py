@@ -320,7 +320,7 @@ def test_a_staircase_stands_alone_in_its_block() -> None:
 
 def test_who_drives_together_has_no_staircase() -> None:
     study = read(StudyFile, STUDY | {'settings': {'seats': ['hv0', 'hv1']}}, 'study')
-    with pytest.raises(InputError, match='blocks: steps: has a staircase.*or "seats"'):
+    with pytest.raises(InputError, match='blocks: steps: is ruled by successes.*or "seats"'):
         members_of(study)
 
 

@@ -168,15 +168,15 @@ def check_command(values: argparse.Namespace) -> int:
     if study.groups is not None:
         print(f'groups by {study.groups.name}: {study.groups.told}')
     for block in study.blocks:
-        if block.staircase is not None:
-            print(f'block {block.name}: {block.staircase.told}')
+        if (rule := block.staircase or block.stop) is not None:
+            print(f'block {block.name}: {rule.told}')
     for group, place, trials in orders_of(study, values.participants):
         print(f'{group}, place {place + 1}:' if group
               else f'{"participant" if members == 1 else "place"} {place + 1}:')
         for number, block_name, what in told_trials(trials):
             print(f'  {number:>3}  {block_name}  {what}')
     length = length_of(study)
-    print(f'a session takes {"at most " if study.has_staircases else ""}about '
+    print(f'a session takes {"at most " if study.is_adaptive else ""}about '
           f'{(length.driving_s + length.else_s) / 60.0:.0f} min, '
           f'{length.driving_s / 60.0:.0f} of them driving')
     return 0

@@ -148,8 +148,9 @@ def _study(data: StudyData, told: Mapping[str, Any]) -> Iterator[Sequence[str]]:
         factors = ' × '.join(f'{factor.name} ({len(factor.levels)})'
                              for factor in study.factors_of(block)) or 'one condition'
         times = 'once' if block.repetitions == 1 else f'{block.repetitions} times'
+        ends = '' if block.stop is None else f'; {block.stop.told}'
         yield f'Block {free(block.name)}', free(
-            f'{factors}, {times} each, order: {order}' if block.staircase is None
+            f'{factors}, {times} each, order: {order}{ends}' if block.staircase is None
             else f'{factors}, {block.staircase.told}')
     views = dict.fromkeys(str(settings.get('view')) for settings in told['conditions'].values())
     yield 'View at the start', ', '.join(plain(_VIEWS.get(view, view)) for view in views)

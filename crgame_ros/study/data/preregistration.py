@@ -143,6 +143,8 @@ def _design(study: StudyFile) -> Iterator[str]:
         yield f'| {block.name} | {names} | {block.repetitions} | {order} |'
     yield ''
     for block in study.blocks:
+        if block.stop is not None:
+            yield from (f'Block {block.name}: {block.stop.told}.', '')
         if block.staircase is not None:
             yield from (f'Block {block.name}: {block.staircase.told}. Each trial draws one of its '
                         'staircases, one for each combination of the other factors, by the seed. '
