@@ -212,7 +212,8 @@ def test_instruments_are_in_bids_as_it_has_them(studied: Studied) -> None:
     folder = studied.folder / 'data' / 'bids' / 'sub-P01' / 'beh'
     name = 'sub-P01_task-demo_run-2_recording-Heart_physio'
     told = json.loads((folder / f'{name}.json').read_text('utf-8'))
-    assert told['Columns'] == ['lead,1', 'lead 2'] and told['lead,1'] == {'Units': 'mV'}
+    assert told['Columns'] == ['lead,1', 'lead 2'] and told['lead,1'] == {
+        'Description': 'channel lead,1 of Heart', 'Units': 'mV'}
     assert told['SamplingFrequency'] == 50.0
     with gzip.open(folder / f'{name}.tsv.gz', 'rt') as stream:
         rows = [line.rstrip('\n').split('\t') for line in stream]

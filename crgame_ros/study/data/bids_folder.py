@@ -92,8 +92,7 @@ def write_bids(data: StudyData, out: Path) -> None:
             'TaskName': task, 'TaskDescription': title, 'StimulusPresentation': {
                 'SoftwareName': 'crgame_ros', 'SoftwareVersion': __version__}, **_sidecar()})
         for trial in trials:
-            write_recordings(trial, folder, f'sub-{labels[record.id]}_task-{task}',
-                             record.begun_at)
+            write_recordings(trial, folder, f'sub-{labels[record.id]}', task, record.begun_at)
 
 
 def escaped(value: object) -> str:

@@ -57,12 +57,14 @@ class _Stream(NamedTuple):
     texts: list[list[str | None]]
 
 
-def write_recordings(trial: CountedTrial, folder: Path, begins: str, begun_s: float) -> None:
+def write_recordings(trial: CountedTrial, folder: Path, participant: str, task: str,
+                     begun_s: float) -> None:
     """
     Write the streams of a trial that have a steady rate, each with a sidecar.
 
     :param folder: of the participant's files.
-    :param begins: beginning of their names.
+    :param participant: label of the participant, such as sub-P01.
+    :param task: label of the study.
     :param begun_s: zero of the participant's events [s since 1970]
     :raises InputError: if a file cannot be written.
     """
@@ -73,15 +75,19 @@ def write_recordings(trial: CountedTrial, folder: Path, begins: str, begun_s: fl
             continue
         label = _label(stream.id, labels)
         labels.add(label)
-        name = f'{begins}_run-{trial.attempt.trial.number}_recording-{label}_physio'
+        name = f'{participant}_task-{task}_run-{trial.attempt.trial.number}' \
+            f'_recording-{label}_physio'
         rows = resampled(stream.times_s, stream.values, stream.rate_hz)
         text = ''.join('\t'.join(map(_cell, row)) + '\n' for row in rows.tolist())
         # Equal data give equal bytes: no time of writing.
         write_bytes(gzip.compress(text.encode('utf-8'), mtime=0), folder / f'{name}.tsv.gz')
         write_text(json.dumps({
-            'SamplingFrequency': stream.rate_hz, 'StartTime': start_s + stream.times_s.min(),
+            'TaskName': task, 'SamplingFrequency': stream.rate_hz,
+            'StartTime': start_s + stream.times_s.min(),
             'Columns': list(stream.units), 'Description': f'{stream.id}, {SAMPLING}',
-            **{channel: {'Units': unit} for channel, unit in stream.units.items() if unit}},
+            **{channel: {'Description': f'channel {channel} of {stream.id}',
+                         **({'Units': unit} if unit else {})}
+               for channel, unit in stream.units.items()}},
             indent=2, ensure_ascii=False) + '\n', folder / f'{name}.json')
 
 
