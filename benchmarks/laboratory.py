@@ -37,10 +37,12 @@ import yaml  # noqa: E402
 
 TRIAL_S = 6.0
 GAZE_HZ = 50.0
-PEOPLE = ('P01', 'P02', 'P03', 'P04')
+# An id so long that no file has it by chance.
+ELSEWHERE, WITHDRAWS = 'P03', 'Leaves-2000-01-01'
+PEOPLE = ('P01', WITHDRAWS, ELSEWHERE, 'P04')
 # A browser that is killed forgets its link, and who is elsewhere cannot be given another.
-ELSEWHERE, WITHDRAWS = 'P03', 'P02'
-KILLS = {'P01': ['page', 'simulation'], 'P02': ['launcher'], 'P03': ['study'], 'P04': ['study']}
+KILLS = {'P01': ['page', 'simulation'], WITHDRAWS: ['launcher'], ELSEWHERE: ['study'],
+         'P04': ['study']}
 
 
 def crgame(*words: object) -> str:
