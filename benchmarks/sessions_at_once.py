@@ -25,7 +25,8 @@ import tempfile
 import time
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'live'))
+TESTS = Path(__file__).resolve().parents[1] / 'test'
+sys.path[:0] = [str(TESTS), str(TESTS / 'live')]
 
 from crgame_ros.paths import scenarios_directory  # noqa: E402, I100
 from crgame_ros.study.quality import QualityBounds, TIMING  # noqa: E402
