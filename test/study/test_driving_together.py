@@ -183,6 +183,11 @@ def test_pages_say_who_waits_for_whom(tmp_path: Path) -> None:
         assert participant_document(desk)['awaits_others'] is False
         desk.ready('main/practice')
         assert rider.is_ready and conductor.woken
+        # Others may be ready while the experimenter holds this one.
+        desk.hold(True)
+        assert not rider.is_ready
+        desk.hold(False)
+        assert rider.is_ready
         rider.enter(DriveState(DrivePhase.READY, 'main/practice', awaits_others=True))
         assert participant_document(desk)['awaits_others'] is True
         told = experimenter_document(desk, {})

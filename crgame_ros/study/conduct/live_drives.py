@@ -159,7 +159,7 @@ class LiveDrives:
         """Prepare an item, and drive it once it is due and all participants are ready."""
         drive = await self._prepare(item)
         for rider in self.riders:
-            rider.is_ready = False
+            rider.ask()
         while self._next() is item:
             self._set_phase(DrivePhase.READY, item.id, drive=drive)
             if self._is_due(item) and all(rider.is_ready for rider in self.riders):

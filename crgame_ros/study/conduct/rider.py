@@ -11,6 +11,7 @@ from crgame_ros.study.drive_state import DrivePhase, DriveState
 from crgame_ros.study.drive_watch import DriveWatch
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.quality import Excess, PAGE, TIMING
+from crgame_ros.study.session_journal import SessionEvent
 
 
 class Conductor(Protocol):
@@ -37,14 +38,13 @@ class Rider:
     :param session: of the participant.
     :param conductor: of the drives.
     :ivar key: by which the cockpit recognises the participant in any browser.
-    :ivar is_ready: whether the participant is ready for the present drive.
     :ivar drive_watch: collects what tells whether the data of the present drive hold.
     """
 
     def __init__(self, session: ParticipantSession, conductor: Conductor) -> None:
         self.session, self._conductor = session, conductor
         self.key = secrets.token_hex(16)
-        self.is_ready = False
+        self._is_ready = False
         self.drive_watch = DriveWatch('')
         self._state = DriveState()
         self._changed: list[Callable[[], None]] = []
@@ -75,10 +75,19 @@ class Rider:
         """Report that the session has advanced."""
         self._conductor.wake()
 
+    @property
+    def is_ready(self) -> bool:
+        """Return whether the participant is ready for the present drive, and nobody holds it."""
+        return self._is_ready and self.session.held_at is None
+
+    def ask(self) -> None:
+        """Forget that the participant is ready: another drive comes."""
+        self._is_ready = False
+
     def ready(self, item: str) -> None:
         """Report that the participant is ready for a drive."""
         if self._state.phase is DrivePhase.READY and self._state.item == item:
-            self.is_ready = True
+            self._is_ready = True
             self._conductor.wake()
 
     def abort(self, reason: str) -> None:
@@ -107,7 +116,7 @@ class Rider:
 
     def repeats(self, item: str, why: str) -> int:
         """Return how often a drive came again for reasons that begin with `why`."""
-        return sum(entry['entry'] == 'aborted' and entry['item'] == item
+        return sum(entry['entry'] == SessionEvent.ABORTED and entry['item'] == item
                    and str(entry.get('reason')).startswith(why)
                    for entry in self.session.journal.entries)
 
