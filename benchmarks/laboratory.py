@@ -32,7 +32,7 @@ from crgame_ros.instruments.loopback import CONFIGURATION  # noqa: E402
 from crgame_ros.yaml_text import read_yaml  # noqa: E402
 import pyarrow.parquet as pq  # noqa: E402
 from study_people import study_session, StudySession  # noqa: E402
-from study_sessions import conduct, table  # noqa: E402
+from study_sessions import conduct, table, tell  # noqa: E402
 import yaml  # noqa: E402
 
 TRIAL_S = 6.0
@@ -65,8 +65,8 @@ def write_study(folder: Path) -> Path:
     study['groups'] = {'name': 'display', 'levels': [
         {'name': 'bare'}, {'name': 'plans', 'plans': True}]}
     study['participants'] = len(PEOPLE)
-    study['factors'] = study['factors'][:1]
-    study['settings']['game'] = read_yaml(file, 'study')['factors'][1]['levels'][0]['game']
+    *study['factors'], scenes = study['factors']
+    study['settings']['game'] = scenes['levels'][0]['game']
     study['blocks'][0] |= {'break_every': 0, 'repetitions': 1,
                            'practice': {'at_least': 1, 'at_most': 1}}
     study['analysis'] = {'comparisons': [
@@ -168,10 +168,7 @@ def main() -> int:
                   if name != WITHDRAWS for entry in session.entries)
     print(f'{len(log)} kills, {aborted} drives came again; {len(table(out, "trials"))} trials, '
           f'{len(table(out, "answers"))} answers are left')
-    for text in wrong:
-        print(f'WRONG: {text}')
-    print('nothing is wrong' if not wrong else f'{len(wrong)} findings')
-    return 1 if wrong else 0
+    return tell(wrong)
 
 
 if __name__ == '__main__':

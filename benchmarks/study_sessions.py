@@ -137,6 +137,14 @@ def table(out: Path, name: str) -> list[dict[str, Any]]:
         return list(csv.DictReader(file))
 
 
+def tell(wrong: list[str]) -> int:
+    """Print what is wrong; return the exit code."""
+    for text in wrong:
+        print(f'WRONG: {text}')
+    print('nothing is wrong' if not wrong else f'{len(wrong)} findings')
+    return 1 if wrong else 0
+
+
 def main() -> int:
     """Run the study, kill, resume, and check the data."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
@@ -182,10 +190,7 @@ def main() -> int:
     # That is the age of a picture.
     print(f'markers and the clock that the page showed [s]: median {statistics.median(late):.3f}, '
           f'worst {max(late):.3f}')
-    for text in wrong:
-        print(f'WRONG: {text}')
-    print('nothing is wrong' if not wrong else f'{len(wrong)} findings')
-    return 1 if wrong else 0
+    return tell(wrong)
 
 
 if __name__ == '__main__':

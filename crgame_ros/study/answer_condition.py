@@ -65,7 +65,37 @@ class AnswerTest:
 
 
 @dataclass(frozen=True)
-class AnswerCondition(AnswerTest):
+class QuestionTest(AnswerTest):
+    """
+    Tests of the answer to a question, or of something else.
+
+    :param question: name of the question.
+    :param questionnaire: name of its questionnaire.
+    """
+
+    # The key of what can be tested instead of a question.
+    ELSE: ClassVar[str]
+
+    question: ColumnName | None = None
+    questionnaire: ColumnName | None = None
+
+    def check(self) -> None:
+        """Refuse tests of nothing, of two things, or none."""
+        if (self.question is None) == (getattr(self, self.ELSE) is None):
+            raise InputError(f'has not one of "question" and "{self.ELSE}"', '',
+                             'give exactly one')
+        if self.questionnaire is not None and self.question is None:
+            raise InputError('has "questionnaire" without "question"', '', 'give both')
+        super().check()
+
+    @property
+    def question_told(self) -> str:
+        """Return the question in words."""
+        return (f'{self.questionnaire}.' if self.questionnaire else '') + str(self.question)
+
+
+@dataclass(frozen=True)
+class AnswerCondition(QuestionTest):
     """
     A condition on an answer; it does not hold without an answer.
 
@@ -75,23 +105,13 @@ class AnswerCondition(AnswerTest):
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
+    ELSE: ClassVar[str] = 'field'
 
-    question: ColumnName | None = None
-    questionnaire: ColumnName | None = None
     field: ColumnName | None = None
-
-    def check(self) -> None:
-        """Refuse a condition on nothing, on two things, or without a test."""
-        if (self.question is None) == (self.field is None):
-            raise InputError('has not one of "question" and "field"', '', 'give exactly one')
-        if self.questionnaire is not None and self.question is None:
-            raise InputError('has "questionnaire" without "question"', '', 'give both')
-        super().check()
 
     def text(self) -> str:
         """Return the condition in words."""
-        return self.text_of(self.field or (
-            f'{self.questionnaire}.' if self.questionnaire else '') + str(self.question))
+        return self.text_of(self.field or self.question_told)
 
 
 def is_one_of(answer: Any, values: tuple[object, ...]) -> bool:

@@ -184,10 +184,14 @@ class Block:
                              'leave it out, or give it to the staircase')
 
     @property
+    def rule(self) -> Staircase | StopRule | None:
+        """Return the rule by which successes decide on its trials; None without one."""
+        return self.staircase or self.stop
+
+    @property
     def judged(self) -> Success | None:
         """Return what makes its trials a success; None if nothing depends on that."""
-        rule = self.staircase or self.stop
-        return None if rule is None else rule.success
+        return None if self.rule is None else self.rule.success
 
 
 @dataclass(frozen=True)

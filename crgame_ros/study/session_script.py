@@ -85,7 +85,7 @@ def settings_of(item: SessionItem) -> TrialSettings | None:
 
 def is_driven(item: SessionItem) -> bool:
     """Return whether an item consists of drives."""
-    return isinstance(item.what, PlannedTrial | PracticeDrives)
+    return settings_of(item) is not None
 
 
 def _seated(item: SessionItem, member: int) -> SessionItem:

@@ -9,15 +9,14 @@ from typing import Annotated, ClassVar, Literal
 from crgame_ros.errors import InputError
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Within
-from crgame_ros.study.answer_condition import AnswerTest
-from crgame_ros.study.names import ColumnName
+from crgame_ros.study.answer_condition import QuestionTest
 
 _SEE = 'see docs/studies.md for the keys'
 OUTCOMES = ('time', 'collision', 'off_road')
 
 
 @dataclass(frozen=True)
-class Success(AnswerTest):
+class Success(QuestionTest):
     """
     What makes a trial a success: an answer after it, or a value of its drive.
 
@@ -28,17 +27,12 @@ class Success(AnswerTest):
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
+    ELSE: ClassVar[str] = 'drive'
 
-    question: ColumnName | None = None
-    questionnaire: ColumnName | None = None
     drive: Literal['outcome', 'contacts', 'departures'] | None = None
 
     def check(self) -> None:
         """Refuse a success of nothing, of two things, without a test, or that never comes."""
-        if (self.question is None) == (self.drive is None):
-            raise InputError('has not one of "question" and "drive"', '', 'give exactly one')
-        if self.questionnaire is not None and self.question is None:
-            raise InputError('has "questionnaire" without "question"', '', 'give both')
         super().check()
         if self.drive == 'outcome' and not (
                 self.values and all(value in OUTCOMES for value in self.values)):
@@ -52,10 +46,8 @@ class Success(AnswerTest):
     @property
     def told(self) -> str:
         """Return it in words."""
-        if self.drive is not None:
-            return self.text_of(f'{self.drive} of the drive')
-        return self.text_of((f'{self.questionnaire}.' if self.questionnaire else '')
-                            + str(self.question))
+        return self.text_of(self.question_told if self.drive is None
+                            else f'{self.drive} of the drive')
 
 
 @dataclass(frozen=True)

@@ -168,8 +168,8 @@ def check_command(values: argparse.Namespace) -> int:
     if study.groups is not None:
         print(f'groups by {study.groups.name}: {study.groups.told}')
     for block in study.blocks:
-        if (rule := block.staircase or block.stop) is not None:
-            print(f'block {block.name}: {rule.told}')
+        if block.rule is not None:
+            print(f'block {block.name}: {block.rule.told}')
     for group, place, trials in orders_of(study, values.participants):
         print(f'{group}, place {place + 1}:' if group
               else f'{"participant" if members == 1 else "place"} {place + 1}:')

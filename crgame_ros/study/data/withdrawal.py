@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from datetime import date
 import fcntl
+from functools import cached_property
 import json
 import os
 from pathlib import Path
@@ -115,7 +116,7 @@ class Withdrawal:
 
     def _shared(self, own: Sequence[Path]) -> Iterator[Path]:
         """Yield recordings of the participant's drives in the folder of another one."""
-        first = self._together()[0]
+        first = self._together[0]
         if first == self.participant:
             return
         # A later run of a program is in the folder of its first one.
@@ -126,6 +127,7 @@ class Withdrawal:
             if '..' not in name.parts and run.is_dir():
                 yield run
 
+    @cached_property
     def _together(self) -> list[str]:
         """Return the ids of those who drove together, the owner of the recordings first."""
         for folder in (self._folder, self._pending / _MOVED):
@@ -211,7 +213,7 @@ class Withdrawal:
             if (data / name).exists():
                 yield data / name
         for entry in sorted((data / KEPT).iterdir()) if (data / KEPT).is_dir() else ():
-            if not _is_of_others(entry, self._together()):
+            if not _is_of_others(entry, self._together):
                 yield entry
         rerun = data / RERUN
         if rerun.is_dir() and (not any(rerun.rglob(GRID_FILE)) or any(map(
@@ -230,7 +232,7 @@ class Withdrawal:
 
     def _names_participant(self, grid: Path) -> bool:
         text = grid.read_text('utf-8', 'replace')
-        return any(f'/{PARTICIPANTS}/{name}/' in text for name in self._together())
+        return any(f'/{PARTICIPANTS}/{name}/' in text for name in self._together)
 
     def _write_anew(self, what: list[str], say: Callable[[str], object]) -> None:
         if not what:
