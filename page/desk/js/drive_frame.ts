@@ -89,7 +89,8 @@ export class DriveFrame {
     // After a reload the stage has to be told again.
     this.#button.hidden = this.#pressed && this.#awaitsOthers;
     if (this.#frame) {
-      this.#frame.inert = ready;
+      // Who waits for others keeps the focus there, with the hands at the controls.
+      this.#frame.inert = ready && !this.#pressed;
       // Before it has a seat and its first picture, the stage shows parts of an incomplete page.
       this.#frame.classList.toggle('loads', ready && !loaded);
     }
