@@ -103,10 +103,10 @@ def _lines(measured: 'RunMeasures') -> Iterator[str]:
 
 def _rule_lines(rules: 'VehicleRules') -> Iterator[str]:
     """Yield the lines passed, and how long the safe distance was not kept, where it was so."""
-    from crgame_ros.analysis.rules.measures import MEASURES
+    from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES
     for name, value in rules.values.items():
         if value:
-            measure = MEASURES[name]
+            measure = RULE_MEASURES[name]
             shown = f'{value:.0f}' if measure.is_count else f'{value:.2f}'
             unit = 's' if measure.unit == 's' else ''
             yield f'  {name:<21}{shown:>8} {unit:<6} {measure.label.lower()}'

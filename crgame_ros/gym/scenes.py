@@ -13,8 +13,8 @@ from crgame_ros.game.file import load_game
 from crgame_ros.game.game import Game, HumanSpec
 from crgame_ros.gym.episode_options import game_at
 from crgame_ros.gym.episode_setups import EpisodeSetups, StartVariation
-from crgame_ros.library.entry import HEAD_BYTES, header_id
 from crgame_ros.library.lookup import find_scenario
+from crgame_ros.library.stored_index import HEAD_BYTES, header_id
 from crgame_ros.paths import scenarios_directory
 import numpy as np
 

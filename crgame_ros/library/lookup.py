@@ -11,10 +11,9 @@ import re
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError, one_line
-from crgame_ros.library.archive_index import ArchiveIndex
-from crgame_ros.library.entry import Entry
-from crgame_ros.library.folder_index import FolderIndex
+from crgame_ros.library.index import ArchiveIndex, FolderIndex
 from crgame_ros.library.places import all_places, is_archive
+from crgame_ros.library.stored_index import Entry
 
 _LOGGER = logging.getLogger(__name__)
 _PATTERN = re.compile(r'[*?\[]')

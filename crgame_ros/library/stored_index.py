@@ -1,19 +1,28 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The user's cache: indexes of places, which can be made again, and files out of archives."""
+"""The user's cache: the entries of places, which can be made again, and files of archives."""
 
 import contextlib
 import hashlib
 import json
 import os
-from pathlib import Path
-from typing import Any
+from pathlib import Path, PurePosixPath
+import re
+from typing import Any, NamedTuple
 
 from crgame_ros.paths import make_folder, user_directory
 from crgame_ros.whole_file import write_bytes, write_whole
 
 FORMAT = 1
 _DIGITS = 16
+# Of a scenario file, also within an archive.
+MAX_BYTES = 64 * 2 ** 20
+# Of a place: beyond it, the user has most likely named another folder than the one meant.
+MOST_FILES = 200_000
+# The root element begins within so many bytes.
+HEAD_BYTES = 8192
+_ROOT = re.compile(rb'<commonRoad\s[^>]*')
+_ID = re.compile(rb'\sbenchmarkID\s*=\s*["\']([^"\']{1,200})["\']')
 
 
 def cache_folder() -> Path:
@@ -86,3 +95,41 @@ def is_kept(path: Path) -> bool:
 def _index_file(place: Path) -> Path:
     digest = hashlib.sha256(os.fsencode(place)).hexdigest()[:_DIGITS]
     return cache_folder() / f'index-{digest}.json'
+
+
+class Entry(NamedTuple):
+    """
+    A scenario.
+
+    :param place: folder or archive that holds it.
+    :param name: its path there, of any origin: it is compared and shown, never opened as a path
+        where it comes from an archive.
+    :param header_id: benchmark id in the file; empty if it has none.
+    """
+
+    place: Path
+    name: str
+    header_id: str
+
+    @property
+    def id(self) -> str:  # noqa: A003
+        """Return the id by which it is looked up first: the file's name without its ending."""
+        return PurePosixPath(self.name).name[:-len('.xml')].removesuffix('.cr')
+
+
+def may_be_scenario(name: str, size: int) -> bool:
+    """Return whether a file may be a scenario, by its name and its size in bytes."""
+    return name.lower().endswith('.xml') and 0 < size <= MAX_BYTES
+
+
+def header_id(head: bytes) -> str | None:
+    """
+    Return the benchmark id in the first bytes of a file.
+
+    :return: None for a file that is no CommonRoad scenario; empty for one without an id.
+    """
+    root = _ROOT.search(head)
+    if root is None:
+        return None
+    found = _ID.search(root.group())
+    return '' if found is None else found[1].decode('utf-8', 'replace').strip()

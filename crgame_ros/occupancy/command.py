@@ -48,8 +48,7 @@ def run(values: argparse.Namespace) -> int:
 
     :return: exit code.
     """
-    from crgame_ros.occupancy.rasterize import Raster
-    from crgame_ros.occupancy.written_map import check_target, write_map
+    from crgame_ros.occupancy.rasterize import check_target, Raster, write_map
     from crgame_ros.scenario.loading import load_scenario
     spec = RasterSpec(values.resolution, values.tile, values.curb_width, values.min_island,
                       values.curbs, values.obstacles, values.close_ends)

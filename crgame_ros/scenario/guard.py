@@ -9,7 +9,7 @@ from pathlib import Path
 import re
 
 from crgame_ros.errors import InputError
-from crgame_ros.library.entry import MAX_BYTES
+from crgame_ros.library.stored_index import MAX_BYTES
 from crgame_ros.paths import irregular
 from lxml import etree
 

@@ -1,16 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The boundary between the variants that a planner passes and those that it fails."""
+"""The boundary between variants that pass and those that fail, and the probability to fail."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+import math
 import warnings
 
-from crgame_ros.search.features import features, pool_of
 from crgame_ros.search.settings import SearchSettings
 from crgame_ros.search.trials import Outcome, Trials
 from crgame_ros.variation.space import Variant, VariantSpace
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
+from scipy.stats import qmc
 
 Array = NDArray[np.float64]
 # Candidates for the next runs, of which those nearest to the boundary are run.
@@ -23,6 +26,13 @@ _MOST = 400
 _APART = 0.05
 # A variant in this range of probabilities is uncertain.
 UNCERTAIN = (0.05, 0.95)
+# Variants among which the sample is drawn: their mean is that of the distributions.
+POOL = 1 << 14
+# Share of the proposal that is the stated distribution itself, so that no weight exceeds 1/share,
+# wherever the model is wrong (defensive importance sampling, Hesterberg 1995).
+DEFENSIVE = 0.3
+# 95 %, two-sided.
+_Z = 1.959964
 
 
 class Boundary:
@@ -110,3 +120,107 @@ def _uncertain(space: VariantSpace, probabilities: Array, pool: Sequence[Variant
                     np.linalg.norm(rows[place] - rows[other]) > apart for other in chosen):
                 chosen.append(int(place))
     return [pool[place] for place in chosen]
+
+
+def features(space: VariantSpace, variants: Sequence[Variant]) -> Array:
+    """
+    Return the points of variants as rows (N, F); a dimension of names has a column for each.
+
+    :return: numbers from 0 to 1.
+    """
+    columns = []
+    for axis in space.axes:
+        if axis.is_numeric:
+            columns.append([axis.share(variant[axis.name]) for variant in variants])
+        else:
+            columns += [[float(variant[axis.name] == value) for variant in variants]
+                        for value in axis.spec.values]
+    return np.array(columns, dtype=float).T.reshape(len(variants), -1)
+
+
+def pool_of(space: VariantSpace, number: int, seed: int) -> list[dict[str, object]]:
+    """
+    Return variants that fill the space evenly, by its distributions.
+
+    :param number: of points drawn, a power of two; those that break a constraint are left out.
+    :param seed: of a scrambled Sobol sequence.
+    """
+    points = qmc.Sobol(len(space.axes), rng=seed).random(number)
+    return [variant for variant in map(space.variant, points) if space.is_allowed(variant)]
+
+
+@dataclass(frozen=True)
+class FailureProbability:
+    """
+    An estimate.
+
+    :param value: of the probability.
+    :param low: lower bound of its 95 % interval.
+    :param high: upper bound.
+    :param runs: number of runs that it rests on.
+    :param failures: how many of them failed.
+    """
+
+    value: float
+    low: float
+    high: float
+    runs: int
+    failures: int
+
+
+def estimate(space: VariantSpace, trials: Trials, settings: SearchSettings,
+             runs: int) -> FailureProbability | None:
+    """
+    Estimate the probability of a failure by importance sampling.
+
+    Variants are drawn with replacement, more often where the boundary's model expects a failure,
+    and weighted by how much more often that is. Runs of before count only in the model, so that
+    the estimate is unbiased.
+
+    :param runs: number of runs.
+    :return: None without runs.
+    """
+    if runs <= 0 or trials.left <= 0:
+        return None
+    pool = pool_of(space, POOL, settings.seed + 7919)
+    even = np.full(len(pool), 1.0 / len(pool))
+    proposal = even
+    if can_learn(trials.known):
+        expected = Boundary(space, trials.known).probabilities(pool)
+        # The deviation of an outcome is the square root of p: the proposal of least variance.
+        expected = np.sqrt(np.maximum(expected, 1e-9))
+        proposal = DEFENSIVE * even + (1.0 - DEFENSIVE) * expected / expected.sum()
+    drawn = np.random.default_rng(settings.seed).choice(
+        len(pool), min(runs, trials.left), p=proposal)
+    outcomes = trials.run([pool[place] for place in drawn])
+    used = [(outcome, float(even[place] / proposal[place]))
+            for outcome, place in zip(outcomes, drawn, strict=False) if outcome.is_known]
+    if not used:
+        return None
+    terms = np.array([weight * outcome.is_failure for outcome, weight in used])
+    failures = sum(outcome.is_failure for outcome, _ in used)
+    return importance_interval(terms, failures, max(weight for _, weight in used))
+
+
+def importance_interval(terms: NDArray[np.float64], failures: int,
+                        heaviest: float) -> FailureProbability:
+    """
+    Return the mean of weighted outcomes with its interval.
+
+    Student's, of the terms; of no failure the exact bound.
+
+    :param terms: (N) weight of each failure, 0 for others.
+    :param failures: their number.
+    :param heaviest: greatest weight that a failure could have.
+    """
+    count = len(terms)
+    mean = float(terms.mean())
+    if failures == 0:
+        # The exact bound of a share of none, each of them worth the heaviest weight at most.
+        high = heaviest * (1.0 - 0.05 ** (1.0 / count))
+        return FailureProbability(0.0, 0.0, min(1.0, high), count, 0)
+    if failures == count and heaviest == 1.0:
+        return FailureProbability(1.0, 0.05 ** (1.0 / count), 1.0, count, failures)
+    error = float(terms.std(ddof=1)) / math.sqrt(count) if count > 1 else math.inf
+    half = float(stats.t.ppf(0.975, max(count - 1, 1))) * error if count < 1000 else _Z * error
+    return FailureProbability(mean, max(0.0, mean - half), min(1.0, mean + half), count, failures)

@@ -75,8 +75,7 @@ def run(values: argparse.Namespace) -> int:
     :raises InputError: if anything cannot be used.
     """
     _require()
-    from crgame_ros.search.findings import write_findings
-    from crgame_ros.search.page import write_search_page
+    from crgame_ros.search.findings import write_findings, write_search_page
     from crgame_ros.search.progress import SearchProgress
     from crgame_ros.search.search import begin, run_search
     from crgame_ros.search.text import lines, results_text

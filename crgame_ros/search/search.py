@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A search, from its folder: it explores, refines, estimates, and goes on where it was stopped."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+import math
 from pathlib import Path
+from typing import Any
+import warnings
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.evaluation.cell_grid import CellGrid, make_grid
@@ -19,14 +22,29 @@ from crgame_ros.evaluation.results.parts import ResultParts
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.file import load_game
 from crgame_ros.schema.writing import write
-from crgame_ros.search.boundary import Boundary, can_learn, refine_boundary
-from crgame_ros.search.explore import explore
-from crgame_ros.search.probability import estimate, FailureProbability
+from crgame_ros.search.boundary import (
+    Boundary,
+    can_learn,
+    estimate,
+    FailureProbability,
+    refine_boundary,
+)
 from crgame_ros.search.settings import BOUNDARY, PROBABILITY, SearchSettings, SMALLEST
-from crgame_ros.search.smallest import shrink
 from crgame_ros.search.trials import Outcome, Trials
 from crgame_ros.simulation.av_assignment import OWN
-from crgame_ros.variation.space import space_of, VariantSpace
+from crgame_ros.variation.space import space_of, Variant, VariantSpace
+import numpy as np
+
+# Points asked for until one keeps the constraints.
+_ASKED = 100
+# Variants that are chosen by chance before there is something to learn from.
+_STARTUP = 8
+# Candidates among which TPE takes the best; its default of 24 needs half as many runs again.
+_CANDIDATES = 96
+# Points between two variants that are run together: the interval shrinks by one more than these.
+_BETWEEN = 3
+# Failures that are nearest to the game as it is, from which lines are drawn to it.
+_STARTS = 3
 
 
 @dataclass(frozen=True)
@@ -151,3 +169,174 @@ def run_search(folder: Path, computing: Computing, began: Began, told: Told) -> 
 
 def _without_variants(grid: CellGrid) -> CellGrid:
     return replace(grid, scenes=tuple(replace(scene, variants=()) for scene in grid.scenes))
+
+
+def explore(space: VariantSpace, trials: Trials, settings: SearchSettings, runs: int) -> None:
+    """
+    Run variants that a sampler chooses, the game as it is first.
+
+    A batch is chosen before any of it is run, so that the variants do not depend on the order in
+    which runs end.
+
+    :param runs: number of runs.
+    """
+    import optuna
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')
+        study = optuna.create_study(sampler=_sampler(settings),
+                                    directions=['minimize'] * len(settings.goals))
+        _Exploration(study, space, trials, settings).run(runs)
+
+
+def _sampler(settings: SearchSettings) -> Any:
+    from optuna import samplers
+    seed = settings.seed
+    if settings.sampler == 'random':
+        return samplers.RandomSampler(seed)
+    if settings.sampler == 'nsga2' or len(settings.goals) > 1:
+        return samplers.NSGAIISampler(seed=seed, population_size=max(settings.batch, 10))
+    if settings.sampler == 'cmaes':
+        return samplers.CmaEsSampler(seed=seed, n_startup_trials=_STARTUP,
+                                     popsize=max(settings.batch, 5), with_margin=False)
+    return samplers.TPESampler(seed=seed, n_startup_trials=_STARTUP, multivariate=True,
+                               constant_liar=True, n_ei_candidates=_CANDIDATES)
+
+
+class _Exploration:
+    """An Optuna study in the unit cube."""
+
+    def __init__(self, study: Any, space: VariantSpace, trials: Trials,
+                 settings: SearchSettings) -> None:
+        from optuna.distributions import CategoricalDistribution, FloatDistribution
+        from optuna.trial import TrialState
+        self._study, self._space, self._trials = study, space, trials
+        self._settings = settings
+        self._failed = TrialState.FAIL
+        self._axes = {axis.name: CategoricalDistribution(range(len(axis.spec.values)))
+                      if axis.spec.values else FloatDistribution(0.0, 1.0)
+                      for axis in space.axes}
+
+    def run(self, runs: int) -> None:
+        end = len(self._trials.outcomes) + runs
+        self._enqueue_nominal()
+        while (count := min(self._settings.batch, end - len(self._trials.outcomes))) > 0:
+            before = len(self._trials.outcomes)
+            asked = [self._ask() for _ in range(count)]
+            outcomes = self._trials.run(variant for _, variant in asked)
+            for (trial, _), outcome in zip(asked, outcomes, strict=False):
+                self._tell(trial, outcome)
+            if len(self._trials.outcomes) == before:
+                # All of them were run before: the sampler has nothing new, as in a small space.
+                break
+
+    def _enqueue_nominal(self) -> None:
+        space = self._space
+        if space.is_allowed(space.nominal):
+            shares = dict(zip(space.names, space.point(space.nominal), strict=True))
+            self._study.enqueue_trial({
+                axis.name: int(shares[axis.name] * len(axis.spec.values)) if axis.spec.values
+                else float(shares[axis.name]) for axis in space.axes})
+
+    def _ask(self) -> tuple[Any, dict[str, object]]:
+        for _ in range(_ASKED):
+            trial = self._study.ask(self._axes)
+            variant = self._space.variant([
+                (trial.params[axis.name] + 0.5) / len(axis.spec.values) if axis.spec.values
+                else trial.params[axis.name] for axis in self._space.axes])
+            if self._space.is_allowed(variant):
+                break
+            self._study.tell(trial, state=self._failed)
+        return trial, variant
+
+    def _tell(self, trial: Any, outcome: Outcome) -> None:
+        if not outcome.is_known:
+            self._study.tell(trial, state=self._failed)
+            return
+        # Where no AV can be blamed, nothing is to be found; nor where a measure is undefined.
+        self._study.tell(trial, [
+            math.inf if value is None or outcome.excused else goal.sign * value
+            for goal, value in zip(self._settings.goals, outcome.values, strict=True)])
+
+
+def shrink(space: VariantSpace, trials: Trials, settings: SearchSettings,
+           runs: int) -> Outcome | None:
+    """
+    Search for the failure that is nearest to the game as it is.
+
+    From the nearest failures that are known: single values are put back while it still fails, then
+    the line to the game as it is is halved, then the neighbourhood is tried.
+
+    :param runs: number of runs.
+    :return: the nearest failure that is known; None without failures, or where the game as it is
+        fails.
+    """
+    end = len(trials.outcomes) + runs
+    if not trials.failures:
+        return None
+    for start in _nearest(space, trials)[:_STARTS]:
+        best = _put_back(space, trials, start, end)
+        _along_line(space, trials, best, end)
+    rng = np.random.default_rng(settings.seed)
+    while len(trials.outcomes) < end:
+        before = len(trials.outcomes)
+        best = _nearest(space, trials)[0]
+        _around(space, trials, best, rng, end)
+        if len(trials.outcomes) == before:
+            break
+    return _nearest(space, trials)[0]
+
+
+def _nearest(space: VariantSpace, trials: Trials) -> list[Outcome]:
+    return sorted(trials.failures, key=lambda outcome: (
+        space.distance(outcome.variant, space.nominal), outcome.number))
+
+
+def _run(space: VariantSpace, trials: Trials, variants: Sequence[Variant],
+         end: int) -> list[Outcome]:
+    left = max(0, end - len(trials.outcomes))
+    return trials.run([variant for variant in variants if space.is_allowed(variant)][:left])
+
+
+def _put_back(space: VariantSpace, trials: Trials, best: Outcome, end: int) -> Outcome:
+    """Put single values back to those of the game, as long as it still fails."""
+    while True:
+        changed = [name for name in space.names if best.variant[name] != space.nominal[name]]
+        tried = _run(space, trials, [dict(best.variant) | {name: space.nominal[name]}
+                                     for name in changed], end)
+        better = [outcome for outcome in tried if outcome.is_failure]
+        if not better:
+            return best
+        best = min(better, key=lambda outcome: space.distance(outcome.variant, space.nominal))
+
+
+def _along_line(space: VariantSpace, trials: Trials, best: Outcome, end: int) -> None:
+    """Halve the line from a failure to the game as it is, until both ends are side by side."""
+    failing, passing = space.point(best.variant), space.point(space.nominal)
+    names = [axis.is_numeric for axis in space.axes]
+    while len(trials.outcomes) < end and np.max(np.abs(failing - passing)) > 1e-3:
+        shares = [(index + 1) / (_BETWEEN + 1) for index in range(_BETWEEN)]
+        points = [np.where(names, failing + share * (passing - failing), failing)
+                  for share in shares]
+        tried = _run(space, trials, [space.variant(point) for point in points], end)
+        before = (failing, passing)
+        for point, outcome in zip(points, tried, strict=False):
+            if outcome.is_failure:
+                failing = point
+            else:
+                passing = point
+                break
+        if before[0] is failing and before[1] is passing:
+            return
+
+
+def _around(space: VariantSpace, trials: Trials, best: Outcome, rng: np.random.Generator,
+            end: int) -> None:
+    """Try points that are nearer to the game as it is, near the line to the best one."""
+    middle, nominal = space.point(best.variant), space.point(space.nominal)
+    size = float(np.linalg.norm(middle - nominal))
+    points = middle + 0.1 * size * rng.standard_normal((64, len(middle)))
+    variants = [space.variant(point) for point in points.clip(0.0, 1.0)]
+    reach = space.distance(best.variant, space.nominal)
+    nearer = [variant for variant in variants if space.distance(variant, space.nominal) < reach]
+    _run(space, trials, nearer[:8], end)

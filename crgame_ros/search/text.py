@@ -7,7 +7,7 @@ from dataclasses import asdict
 import json
 
 from crgame_ros.evaluation.variants_page import Verdict
-from crgame_ros.search.features import pool_of
+from crgame_ros.search.boundary import pool_of
 from crgame_ros.search.search import SearchResult
 from crgame_ros.search.trials import Outcome
 from crgame_ros.variation.space import Variant, VariantSpace

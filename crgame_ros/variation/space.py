@@ -12,7 +12,7 @@ import math
 from statistics import NormalDist
 from typing import Any
 
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, short
 from crgame_ros.game.file import parse_game
 from crgame_ros.game.game import Game
 from crgame_ros.game.variation_spec import (
@@ -25,10 +25,9 @@ from crgame_ros.game.variation_spec import (
 )
 from crgame_ros.schema.reading import read
 from crgame_ros.schema.writing import write
-from crgame_ros.variation.expression import Expression
-from crgame_ros.variation.key_path import value_at, with_value
 import numpy as np
 from numpy.typing import NDArray
+from simpleeval import InvalidExpression, SimpleEval
 
 Variant = Mapping[str, object]
 Point = NDArray[np.float64]
@@ -36,6 +35,9 @@ Point = NDArray[np.float64]
 DIGITS = 6
 # Share of the probability of a distribution that is cut off at an open end.
 _OPEN = 1e-9
+_NAMES = ('id', 'name')
+_FUNCTIONS = {'abs': abs, 'min': min, 'max': max, 'sqrt': math.sqrt, 'round': round}
+_LONGEST = 500
 
 
 class Axis:
@@ -260,3 +262,91 @@ def game_of(game: Game, variant: Variant, where: str) -> Game:
     """
     space = VariantSpace(game.vary, write(game, game.base), where)
     return parse_game(space.game_values(variant), where, game.base)
+
+
+def value_at(values: Any, path: str) -> object:
+    """
+    Return the value of a key; None where it is not given.
+
+    :param values: mappings and lists, as `write` returns them.
+    :param path: names of keys, and ids, names or indices of entries, with dots between.
+    """
+    for name in path.split('.'):
+        if isinstance(values, dict):
+            values = values.get(name)
+        elif isinstance(values, list):
+            place = _place(values, name)
+            values = None if place is None else values[place]
+        else:
+            return None
+    found: object = values
+    return found
+
+
+def with_value(values: Any, path: str, value: object, where: str = '') -> Any:
+    """
+    Return values with a key changed or added; what is not on its path is shared.
+
+    :param where: for messages.
+    :raises InputError: if an entry or a section of the path does not exist.
+    """
+    name, _, rest = path.partition('.')
+    if isinstance(values, list):
+        place = _place(values, name)
+        if place is None:
+            raise InputError(f'there is no entry {short(name)}', where,
+                             f'there are {", ".join(_names_of(values)) or "none"}')
+        inner = with_value(values[place], rest, value, where) if rest else value
+        return [*values[:place], inner, *values[place + 1:]]
+    if values is None:
+        values = {}
+    if not isinstance(values, dict):
+        raise InputError(f'{short(name)} is in no section', where, 'name a key of the game')
+    return values | {name: with_value(values.get(name), rest, value, where) if rest else value}
+
+
+def _place(entries: list[Any], name: str) -> int | None:
+    for index, entry in enumerate(entries):
+        if isinstance(entry, dict) and name in (entry.get(key) for key in _NAMES):
+            return index
+    return int(name) if name.isdecimal() and int(name) < len(entries) else None
+
+
+def _names_of(entries: list[Any]) -> list[str]:
+    return [next((str(entry[key]) for key in _NAMES if isinstance(entry, dict) and key in entry),
+                 str(index)) for index, entry in enumerate(entries)]
+
+
+class Expression:
+    """
+    An expression.
+
+    :param text: such as `gap + 0.5 * speed`.
+    :param where: file and key, for messages.
+    :raises InputError: if it is no expression.
+    """
+
+    def __init__(self, text: str, where: str) -> None:
+        self._text, self._where = text, where
+        try:
+            if len(text) > _LONGEST:
+                raise SyntaxError(f'longer than {_LONGEST} characters')
+            self._parsed = SimpleEval.parse(text)
+        except (SyntaxError, InvalidExpression, ValueError, RecursionError) as error:
+            raise InputError(f'{short(text)} is no expression', where,
+                             f'write it like gap > 0.5 * speed ({error})'[:200]) from error
+
+    def value(self, names: Mapping[str, object]) -> object:
+        """
+        Return its value.
+
+        :param names: values of the names that it may contain.
+        :raises InputError: if it has none.
+        """
+        try:
+            return SimpleEval(names=dict(names), functions=_FUNCTIONS).eval(
+                self._text, previously_parsed=self._parsed)
+        except (InvalidExpression, ArithmeticError, ValueError, TypeError, KeyError,
+                RecursionError) as error:
+            raise InputError(f'{short(self._text)} has no value ({error})'[:200], self._where,
+                             f'there are {", ".join(names) or "no names"}') from error

@@ -65,8 +65,7 @@ def run(values: argparse.Namespace) -> int:
     """
     from crgame_ros.analysis.report.command import REPORT_FILE
     from crgame_ros.verdict.cases import replay_command, run_cases
-    from crgame_ros.verdict.page import write_page
-    from crgame_ros.verdict.verdicts import broken_lines, junit_xml, verdicts_of
+    from crgame_ros.verdict.verdicts import broken_lines, junit_xml, verdicts_of, write_page
     from crgame_ros.whole_file import write_bytes, write_text
     cases = _cases(values)
     if not cases:

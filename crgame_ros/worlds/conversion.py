@@ -9,6 +9,7 @@ import re
 import tempfile
 
 from crgame_ros.errors import InputError, one_line
+from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.export_document import scenario_document, scenario_header
@@ -17,13 +18,18 @@ from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.export_network import used_ids, write_roads
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.worlds.environments import DESIGNER, run_converter
-from crgame_ros.worlds.inspection import road_remarks
 from crgame_ros.worlds.kinds import LANELET2, OPENDRIVE, OSM, WorldKind
 from crgame_ros.worlds.lanelet2 import prepare_lanelet2
 from crgame_ros.worlds.mending import mend_map
-from crgame_ros.worlds.opendrive import prepare_opendrive
-from crgame_ros.worlds.sumo import light_cycles, LightCycle, to_opendrive, without_turns
+from crgame_ros.worlds.opendrive import (
+    light_cycles,
+    LightCycle,
+    prepare_opendrive,
+    to_opendrive,
+    without_turns,
+)
 from lxml import etree
+import numpy as np
 
 TIME_STEP_S = 0.1
 # Of the AV that an imported map gets: length of its way [m], its speed at the start [m/s], and the
@@ -34,6 +40,12 @@ _FROM_START = 10.0
 _DECLARATION = re.compile(r'<\?xml[^>]*\?>')
 _NAMESPACE = re.compile(r'\sxmlns=("[^"]*"|\'[^\']*\')')
 _NO_WORD = re.compile('[^A-Za-z0-9]')
+# Between the end of a lane and the start of the next one: a corner [rad] and a gap [m] that a
+# driver feels.
+_KINK, _GAP = 0.35, 0.5
+# Lanes that end within the map, not at its edge: so far from the edge [m].
+_INSIDE = 20.0
+_TOLD = 3
 
 
 @dataclass(frozen=True)
@@ -173,3 +185,37 @@ def _problem(network: RoadNetwork, number: int, written: dict[int, int]) -> str:
     goal = lanelet_references([written.get(chain[-1], chain[-1])])
     return planning_problem(number, (x, y, yaw, min(limit, _SPEED), 0.0, 0.0),
                             [goal_state((0, _GOAL_STEPS), goal)])
+
+
+def road_remarks(network: RoadNetwork) -> list[str]:
+    """
+    Return remarks on the lanes for cars, one line each.
+
+    They are on lanes that end within the map, kinks and gaps between lanes, and missing limits.
+    """
+    lanes = [lanelet for lanelet in network.lanelet_ids if network.is_drivable(lanelet)]
+    if not lanes:
+        return []
+    points = np.concatenate([network.line(lanelet).points for lanelet in lanes])
+    low, high = points.min(axis=0) + _INSIDE, points.max(axis=0) - _INSIDE
+    ends, kinks, gaps, unlimited = [], [], [], []
+    for lanelet in lanes:
+        line = network.line(lanelet)
+        after = [other for other in network.successors(lanelet) if other != lanelet]
+        if not after and ((line.points[-1] > low) & (line.points[-1] < high)).all():
+            ends.append(lanelet)
+        for other in after:
+            next_line = network.line(other)
+            if abs(wrap_pi(float(next_line.heading[0] - line.heading[-1]))) > _KINK:
+                kinks.append(lanelet)
+            if np.hypot(*(next_line.points[0] - line.points[-1])) > _GAP:
+                gaps.append(lanelet)
+        if network.speed_limit(lanelet) is None:
+            unlimited.append(lanelet)
+    return [f'{len(found)} of {len(lanes)} lanes {what}: lanelet '
+            + ', '.join(map(str, found[:_TOLD])) + (' …' if len(found) > _TOLD else '')
+            for found, what in (
+                (ends, 'end within the map'),
+                (kinks, f'turn by more than {np.degrees(_KINK):.0f} degrees at their end'),
+                (gaps, f'end more than {_GAP:g} m from the start of the next one'),
+                (unlimited, "have no speed limit: agents take their road type's")) if found]

@@ -8,7 +8,7 @@ import math
 
 from commonroad.scenario.traffic_sign import TrafficSignIDCountries
 from crgame_ros.scenario.export_ids import IdPool
-from crgame_ros.worlds.sumo import LightCycle
+from crgame_ros.worlds.opendrive import LightCycle
 from lxml import etree
 import numpy as np
 from numpy.typing import NDArray

@@ -12,9 +12,8 @@ from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.occupancy.map_file import RasterSpec
 from crgame_ros.occupancy.occupancy import OccupancyGrid
-from crgame_ros.occupancy.rasterize import Raster
+from crgame_ros.occupancy.rasterize import Raster, write_map
 from crgame_ros.occupancy.tiles import TiledOccupancy
-from crgame_ros.occupancy.written_map import write_map
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 import numpy as np

@@ -10,9 +10,9 @@ import sys
 import tarfile
 
 from crgame_ros.errors import InputError
-from crgame_ros.library.entry import MAX_BYTES
 from crgame_ros.library.lookup import all_ids, find_scenario, find_scenarios, scenario_of
 from crgame_ros.library.places import drop_place, store_place
+from crgame_ros.library.stored_index import MAX_BYTES
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -6,9 +6,9 @@ import os
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.occupancy.image import open_pgm, write_pgm
 from crgame_ros.occupancy.map_file import read_map_file
 from crgame_ros.occupancy.occupancy import OccupancyGrid
+from crgame_ros.occupancy.sources import open_pgm, write_pgm
 import numpy as np
 from PIL import Image
 import pytest

@@ -7,9 +7,9 @@ import shutil
 import tracemalloc
 
 from crgame_ros.errors import InputError
-from crgame_ros.occupancy.image import write_pgm
 from crgame_ros.occupancy.map_file import map_text
 from crgame_ros.occupancy.occupancy import OccupancyGrid
+from crgame_ros.occupancy.sources import write_pgm
 from crgame_ros.occupancy.tiles import TiledOccupancy
 import numpy as np
 from numpy.typing import NDArray

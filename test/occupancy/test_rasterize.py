@@ -13,9 +13,8 @@ from crgame_ros.errors import InputError
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.occupancy.map_file import RasterSpec
 from crgame_ros.occupancy.occupancy import OccupancyGrid
-from crgame_ros.occupancy.rasterize import draw, Raster
+from crgame_ros.occupancy.rasterize import draw, Raster, write_map
 from crgame_ros.occupancy.tiles import TiledOccupancy
-from crgame_ros.occupancy.written_map import write_map
 from crgame_ros.roads.boundary import RoadBoundary
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario, parse_scenario
 import numpy as np

@@ -13,7 +13,7 @@ from commonroad_dc.collision.collision_detection.pycrcc_collision_dispatch impor
 )
 from commonroad_dc.feasibility import solution_checker
 from crgame_ros.analysis.scores.commonroad_costs import COSTS
-from crgame_ros.analysis.scores.measures import MEASURES
+from crgame_ros.analysis.scores.measures import SCORE_MEASURES
 from crgame_ros.analysis.scores.scored_run import score_run
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.cli import main
@@ -121,7 +121,7 @@ def test_the_table_has_what_the_command_says(
 def test_no_score_is_left_out_of_the_table(vehicles: polars.DataFrame) -> None:
     """Only latencies, which stand with the plans, are exempt."""
     assert {name for name in vehicles.columns if name.startswith('score_')} == set(COLUMNS)
-    assert len(COLUMNS) == len(MEASURES) - 1 + 2
+    assert len(COLUMNS) == len(SCORE_MEASURES) - 1 + 2
 
 
 def test_a_run_that_cannot_be_scored_has_its_tables_all_the_same(
@@ -154,7 +154,7 @@ def test_scores_of_an_offline_run(record: RunRecord, result: OfflineResult) -> N
                  'nuplan_score': vehicle['nuplan']['score'],
                  'valid': vehicle['commonroad']['valid'],
                  'feasible': vehicle['commonroad']['feasibility']['feasible']}
-        missing = set(MEASURES) - set(parts)
+        missing = set(SCORE_MEASURES) - set(parts)
         assert missing == (set() if vehicle is av else {'accepted_share', 'latency_ms', 'age_ms'})
     assert av['plans']['accepted_share'] == result.planners['av0'].accepted_ratio
     assert av['plans']['requests'] == result.planners['av0'].counters.requests

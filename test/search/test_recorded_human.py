@@ -11,7 +11,7 @@ from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.offline_recording import write_recording
 from crgame_ros.schema.writing import write
-from crgame_ros.search.live_game import for_a_person
+from crgame_ros.search.findings import for_a_person
 from crgame_ros.search.recorded_human import game_of_run
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup

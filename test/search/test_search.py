@@ -16,9 +16,7 @@ import time
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.schema.writing import write
-from crgame_ros.search.boundary import Boundary
-from crgame_ros.search.features import pool_of
-from crgame_ros.search.probability import importance_interval
+from crgame_ros.search.boundary import Boundary, importance_interval, pool_of
 from crgame_ros.search.trials import Outcome
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import run_offline

@@ -14,8 +14,7 @@ from crgame_ros.scenario.export_network import schema_errors
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.worlds.environments import SUMO_TOOLS
 from crgame_ros.worlds.kinds import find_kind
-from crgame_ros.worlds.lanelet2 import prepare_lanelet2
-from crgame_ros.worlds.local_plane import mercator_degrees, tangent_plane
+from crgame_ros.worlds.lanelet2 import mercator_degrees, prepare_lanelet2, tangent_plane
 from lxml import etree
 from made_maps import lanelet2, opendrive, openstreetmap
 import numpy as np

@@ -9,7 +9,7 @@ from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import Section
 from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
-from crgame_ros.analysis.rules.measures import MEASURES
+from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.units import unit_symbol
 
@@ -56,10 +56,10 @@ def _rules(run: Run) -> str:
     html = table('Traffic rules', ('vehicle', *(
         f'<span title="{plain(f"{each.definition}; {each.variant}")}">{each.label}</span>'
         + ('' if each.unit == '1' else f' [{unit_symbol(each.unit)}]')
-        for each in MEASURES.values())), [
+        for each in RULE_MEASURES.values())), [
             (named(run, vehicle.vehicle_id), *(
                 number(vehicle.values[name], 0 if each.is_count else 2)
-                for name, each in MEASURES.items()))
+                for name, each in RULE_MEASURES.items()))
             for vehicle in run.usual_rules], 'numbers')
     scheduler = run.log.game.scheduler
     passed = [(named(run, vehicle.vehicle_id), each.kind, str(each.lanelet),

@@ -9,7 +9,7 @@ from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import Section
 from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.analysis.scores.measures import MEASURES
+from crgame_ros.analysis.scores.measures import SCORE_MEASURES
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 
 # Label of a measure and number of digits; costs range from hundredths to millions.
@@ -86,7 +86,7 @@ def _rows(drivers: Sequence[_Driver]) -> Iterator[Sequence[str]]:
     for name, words in _WORDS.items():
         if all(each[name] is None for each in values):
             continue
-        measure = MEASURES[name]
+        measure = SCORE_MEASURES[name]
         title = plain(f'{measure.definition}; {measure.variant}')
         unit = '' if measure.unit == '1' else measure.unit
         yield (f'<span title="{title}">{words}</span>', unit,

@@ -27,7 +27,7 @@ _NUPLAN = 'nuplan-devkit, closed loop'
 _OURS = 'crgame_ros'
 _SHORT = 'the run has fewer than 5 time steps'
 _NO_PLANS = 'it has no planner, or its plans were not recorded'
-MEASURES = {
+SCORE_MEASURES = {
     'nuplan_score': ScoreMeasure('1', 'product of the multipliers times the weighted mean',
                                  _NUPLAN, _SHORT),
     'no_collision_at_fault': ScoreMeasure(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from crgame_ros.analysis.scores.goal_record import GoalRecord
-from crgame_ros.analysis.scores.measures import MEASURES
+from crgame_ros.analysis.scores.measures import SCORE_MEASURES
 from crgame_ros.analysis.scores.nuplan import NuplanScore
 from crgame_ros.recording.plan_outcome import PlanOutcome
 
@@ -49,8 +49,8 @@ class VehicleScores:
             'remarks': list(self.remarks)}
 
     def values(self) -> dict[str, float | None]:
-        """Return each score of `MEASURES`, the median for spreads; None where there is none."""
-        found: dict[str, float | None] = dict.fromkeys(MEASURES)
+        """Return each score of `SCORE_MEASURES`, the median for spreads; None if there is none."""
+        found: dict[str, float | None] = dict.fromkeys(SCORE_MEASURES)
         if self.nuplan is not None:
             found |= {'nuplan_score': self.nuplan.score, **self.nuplan.multipliers,
                       **self.nuplan.weighted}

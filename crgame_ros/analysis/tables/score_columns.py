@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.analysis.scores.measures import MEASURES
+from crgame_ros.analysis.scores.measures import SCORE_MEASURES
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.analysis.tables.column import Column, FLAG, NUMBER, TEXT
 from crgame_ros.analysis.tables.part import TablePart
@@ -33,13 +33,13 @@ class _ScoreColumn(NamedTuple):
 # Latencies are in the plans' own columns.
 _COLUMNS = (
     _ScoreColumn('score_nuplan', 'nuplan_score'),
-    *(_ScoreColumn(f'score_{name.removesuffix("_m").lower()}', name) for name in MEASURES
+    *(_ScoreColumn(f'score_{name.removesuffix("_m").lower()}', name) for name in SCORE_MEASURES
       if name not in ('nuplan_score', 'latency_ms', 'age_ms')),
     _ScoreColumn('score_age_p50_s', 'age_ms', 1e-3, True))
 
 
 def _declared(column: _ScoreColumn) -> Column:
-    measure = MEASURES[column.measure]
+    measure = SCORE_MEASURES[column.measure]
     flag = not measure.unit
     return Column(
         column.name, FLAG if flag else NUMBER, 's' if column.median else measure.unit,
@@ -73,7 +73,7 @@ def _failed(scores: VehicleScores | None) -> str | None:
 VEHICLE_SCORES = TablePart((
     *map(_declared, _COLUMNS),
     Column('score_expert', TEXT, '', 'with whose progress it was compared: scores with different '
-           'experts are not comparable', empty=f'{MEASURES["progress"].undefined}, or '
+           'experts are not comparable', empty=f'{SCORE_MEASURES["progress"].undefined}, or '
            f'{NOT_SCORED}'),
     Column('score_failed_checks', TEXT, '', 'names of the checks of valid_solution that it fails',
            variant='docs/scores.md', empty=f'all are passed, or {NOT_SCORED}')), _scores)

@@ -10,7 +10,7 @@ from crgame_ros.analysis.pictures.frame_svg import frame_svg
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.analysis.report.file import write_report
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.analysis.scores.measures import MEASURES
+from crgame_ros.analysis.scores.measures import SCORE_MEASURES
 from crgame_ros.analysis.scores.nuplan import NuplanScore, WEIGHTS
 from crgame_ros.analysis.scores.run_scores import scores_of
 from crgame_ros.cockpit.job_loop import serve_jobs
@@ -89,7 +89,7 @@ def _score_values(found: NuplanScore | None) -> dict[str, object]:
     parts += [(name, value, WEIGHTS[name]) for name, value in found.weighted.items()]
     return {'score': _number(found.score), 'parts': [
         {'name': _WORDS[name], 'value': _number(value), 'weight': weight,
-         'definition': MEASURES[name].definition} for name, value, weight in parts]}
+         'definition': SCORE_MEASURES[name].definition} for name, value, weight in parts]}
 
 
 def _motion(log: RunTrajectories, number: int) -> dict[str, object]:

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 from crgame_ros.analysis.criticality.criticality import CHIEF, EXPOSURES
 from crgame_ros.analysis.criticality.criticality import MEASURES as CRITICALITY
 from crgame_ros.analysis.criticality.thresholds import USUAL
-from crgame_ros.analysis.rules.measures import MEASURES as RULES
+from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES as RULES
 from crgame_ros.analysis.tables.column import FLAG, INTEGER, NUMBER
 from crgame_ros.analysis.tables.vehicles import VEHICLES
 from crgame_ros.errors import InputError, short

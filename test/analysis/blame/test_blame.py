@@ -14,8 +14,8 @@ from crgame_ros.evaluation.results.cell_rows import vehicle_rows
 from crgame_ros.game.file import load_game, parse_game
 from crgame_ros.geometry.polyline import ReferencePath
 from crgame_ros.messages.plan import Plan, PlanRequest
-from crgame_ros.occupancy.image import write_pgm
 from crgame_ros.occupancy.map_file import map_text
+from crgame_ros.occupancy.sources import write_pgm
 from crgame_ros.paths import config_directory, scenarios_directory
 from crgame_ros.planner.constant_velocity import ConstantVelocityPlanner
 from crgame_ros.planner.interface import PlannerContext
