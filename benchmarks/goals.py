@@ -24,7 +24,7 @@ import sys
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.analysis.scores.driven_states import choose_type, driven_states
-from crgame_ros.analysis.scores.goal_record import find_goal
+from crgame_ros.analysis.scores.vehicle import find_goal
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.game import Game
 from crgame_ros.recording.run_record import run_record_of

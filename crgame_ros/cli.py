@@ -75,7 +75,7 @@ TOOLS = (
     _Tool('dds-profile', 'nodes that you start one by one believe each other alone',
           'crgame_ros.ros.profile_command'),
     _Tool('page-libraries', 'fetch three.js and Plotly, which draw the 3D view and plots',
-          'crgame_ros.page_libraries_command'),
+          'crgame_ros.page_libraries'),
     _Tool('models', 'planners, trackers, sensors and other parts to name, and their options',
           'crgame_ros.models_command'),
     _Tool('schema', 'what a game file and other files may say, for editors',

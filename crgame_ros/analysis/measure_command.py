@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def measure(values: argparse.Namespace) -> int:
     """Measure a run, and print the results."""
-    from crgame_ros.analysis.behaviour.text import behaviour_lines, detection_lines
+    from crgame_ros.analysis.behaviour.driver import behaviour_lines, detection_lines
     from crgame_ros.analysis.run_measures import check_requests, measure_run
     from crgame_ros.recording.progress import Progress
     from crgame_ros.recording.run_folder import recording_in

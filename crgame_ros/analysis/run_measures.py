@@ -5,9 +5,8 @@
 from collections.abc import Callable, Collection
 from typing import NamedTuple
 
-from crgame_ros.analysis.behaviour.driver import measure_behaviour
+from crgame_ros.analysis.behaviour.driver import DriverBehaviour, measure_behaviour
 from crgame_ros.analysis.behaviour.task_events import detection_scores, DetectionScore, task_events
-from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL

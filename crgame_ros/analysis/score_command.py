@@ -15,8 +15,8 @@ from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.library.lookup import find_scenario
 
 if TYPE_CHECKING:  # A command that needs no engine starts without it.
-    from crgame_ros.analysis.scores.planner import PlannerScores
     from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
+    from crgame_ros.analysis.scores.vehicle import PlannerScores
 
 DESCRIPTION = """\
 Score the drivers of a run: CommonRoad's costs and checks, feasibility, nuPlan's closed-loop score,

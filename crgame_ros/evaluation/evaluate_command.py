@@ -6,21 +6,24 @@ import argparse
 from collections.abc import Callable
 from datetime import datetime
 from functools import partial
+import json
 from pathlib import Path
 import sys
 from typing import Any, get_args, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.file_names import GRID_FILE, REPORTS, SEARCH_FILE
-from crgame_ros.evaluation.summary.command import add_summary_arguments
 from crgame_ros.game.variation_spec import Sampling
 from crgame_ros.library.lookup import names_file
 from crgame_ros.paths import find_game, make_folder
 from crgame_ros.schema.marks import named_file
 
-if TYPE_CHECKING:  # Other commands do not wait for it.
+if TYPE_CHECKING:
     from crgame_ros.evaluation.evaluation import Computing
     from crgame_ros.evaluation.plan import EvaluationPlan
+
+SUMMARY_FILE = 'summary.html'
+FORMATS = ('text', 'markdown', 'json')
 
 
 def report_cell(folder: Path, key: str, say: Callable[[str], object]) -> Path:
@@ -147,7 +150,6 @@ def run_command(values: argparse.Namespace) -> int:
 
 def _inspect(values: argparse.Namespace) -> int:
     from crgame_ros.evaluation.folder import EvaluationFolder
-    from crgame_ros.evaluation.summary.command import summarise_command
     if values.plan is None or not values.plan.is_dir():
         raise InputError('needs the folder of an evaluation',
                          '--cell' if values.cell else '--summary',
@@ -158,7 +160,7 @@ def _inspect(values: argparse.Namespace) -> int:
     code = summarise_command(values.plan, values)
     grid = EvaluationFolder(values.plan).grid() if (values.plan / GRID_FILE).exists() else None
     if grid is not None and any(scene.variants for scene in grid.scenes):
-        from crgame_ros.evaluation.variant_results import write_variant_pages
+        from crgame_ros.evaluation.variants_page import write_variant_pages
         for page in write_variant_pages(values.plan, grid, values.measure or ()):
             print(page, file=sys.stderr)
     return code
@@ -252,3 +254,43 @@ def _computing(values: argparse.Namespace) -> 'Computing':
             raise InputError(f'is {value:g}', f'--{name}', f'give {least:g} or more')
     return Computing(values.scheduler, workers, values.dashboard, values.cell_timeout,
                      round(values.cell_memory * GIGABYTE), values.part_cells, values.retry)
+
+
+def add_summary_arguments(parser: 'argparse.ArgumentParser | argparse._ArgumentGroup') -> None:
+    """Declare the arguments of a summary."""
+    parser.add_argument('--format', choices=FORMATS, default='text',
+                        help='output format (default: text)')
+    parser.add_argument('--measure', action='append', metavar='NAME', help='measure to summarise; '
+                        'may be given several times (default: all that docs/evaluation.md names)')
+    parser.add_argument('--by', action='append', metavar='FACTOR', help='factor that defines '
+                        'the groups: planner, scenario, game, human, participant, perception or '
+                        'traffic; may be given several times (default: planner)')
+    parser.add_argument('--baseline', metavar='PLANNER', help='planner with which the others '
+                        'are compared (default: idm, or the first planner)')
+    parser.add_argument('--worst', action='append', metavar='NAME', help='measure by which the '
+                        'worst cells are chosen; may be given several times, the first one counts '
+                        'first (default: collision, then worst_ttc)')
+
+
+def summarise_command(folder: Path, values: argparse.Namespace) -> int:
+    """
+    Print the summary of an evaluation, and write its page into the folder.
+
+    :param folder: folder of the evaluation.
+    :param values: values of the arguments that `add_summary_arguments` declares.
+    :raises InputError: if the evaluation or an argument cannot be used.
+    """
+    from crgame_ros.evaluation.summary.html_page import write_summary_page
+    from crgame_ros.evaluation.summary.summarise import summarise
+    from crgame_ros.evaluation.summary.text import summary_markdown, summary_text
+    summary = summarise(folder, measures=values.measure, by=tuple(values.by or ('planner',)),
+                        baseline=values.baseline, worst=values.worst)
+    if values.format == 'json':
+        print(json.dumps(summary.as_dict(), indent=2, allow_nan=False, ensure_ascii=False))
+    else:
+        write = summary_markdown if values.format == 'markdown' else summary_text
+        print(write(summary), end='')
+    page = folder / SUMMARY_FILE
+    write_summary_page(summary, page)
+    print(page, file=sys.stderr)
+    return 0

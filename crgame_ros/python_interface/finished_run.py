@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # They take a second to import, and only measures need them.
-    from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
+    from crgame_ros.analysis.behaviour.driver import DriverBehaviour
     from crgame_ros.analysis.criticality.criticality import VehicleCriticality
     from crgame_ros.analysis.scores.vehicle import VehicleScores
     import pyarrow as pa

@@ -9,8 +9,8 @@ from crgame_ros.analysis.counterfactual import Alternative
 from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
 from crgame_ros.analysis.measure_command import HEAD, replay_rows
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
+from crgame_ros.analysis.report.section import free, NOTHING, number, share, table
 from crgame_ros.analysis.report.story_section import moment_image
-from crgame_ros.analysis.report.text import free, NOTHING, number, share, table
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.vehicle.state import StateColumn
 

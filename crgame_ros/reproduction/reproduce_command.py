@@ -58,8 +58,8 @@ def reproduce(values: argparse.Namespace) -> int:
         evaluate_single_av,
         evaluate_timing,
         EvaluationRequest,
+        write_report,
     )
-    from crgame_ros.reproduction.report import write_report
     formats = _formats(values.format)
     if not 1.0 <= values.duration < math.inf:
         raise InputError(f'is {values.duration:g} s', '--duration', 'give a second or more')

@@ -215,7 +215,7 @@ def _solution(path: Path, _progress: Progress | None) -> FileVerdict:
 
 def _tables(path: Path, _progress: Progress | None) -> FileVerdict:
     """Check exported tables by their dictionary."""
-    from crgame_ros.analysis.tables.check import table_faults
+    from crgame_ros.analysis.tables.data_package import table_faults
     count, faults = table_faults(path)
     return FileVerdict(f'{count} tables', tuple(faults[:_SHOWN]))
 

@@ -15,7 +15,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.evaluation import results
 from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
 from crgame_ros.evaluation.results.parts import EARLIER, ResultParts
-from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
+from crgame_ros.evaluation.summary.cell_block import EvaluatedParts
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest

@@ -7,7 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from crgame_ros.cli import main
-from crgame_ros.reproduction.report import CAPTIONS
+from crgame_ros.reproduction.commonroad_game import CAPTIONS
 import pytest
 
 pytestmark = pytest.mark.xdist_group('reproduction')

@@ -6,10 +6,11 @@ from dataclasses import replace
 
 from crgame_ros.analysis.counterfactual import Alternative
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.reproduction.encounter import DrivenLane, Encounter
 from crgame_ros.reproduction.expectation import judge
 from crgame_ros.reproduction.recorded_human import record_offline, RecordedHuman
 from crgame_ros.reproduction.single_av_evaluation import (
+    DrivenLane,
+    Encounter,
     HUMAN_EXPECTATIONS,
     IDM_EXPECTATIONS,
     judge_single_av,

@@ -1,15 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Measures how each driven vehicle of a run was driven, from any run's record.
+Measures how each driven vehicle of a run was driven, and says it in lines of text.
 
 `MEASURES` defines each measure; `docs/behaviour.md` explains them.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 import math
 
-from crgame_ros.analysis.behaviour.driver_controls import DriverControls
+from crgame_ros.analysis.behaviour.driver_controls import (
+    COGNITIVE,
+    DriverControls,
+    reversal_rate,
+    ReversalSetting,
+    Spread,
+    spread_of,
+    use_of_pedal,
+    VISUAL,
+)
 from crgame_ros.analysis.behaviour.gaps_accepted import AcceptedGap, gap_in_lane, Neighbour
 from crgame_ros.analysis.behaviour.lane_keeping import (
     ChangeOfLane,
@@ -19,16 +29,17 @@ from crgame_ros.analysis.behaviour.lane_keeping import (
     sdlp,
 )
 from crgame_ros.analysis.behaviour.lane_visits import LaneVisit
-from crgame_ros.analysis.behaviour.measures import STABLE_ACCELERATION
-from crgame_ros.analysis.behaviour.pedal_use import Spread, spread_of, use_of_pedal
-from crgame_ros.analysis.behaviour.reactions import reaction_to, ResponseLimits, USUAL_LIMITS
-from crgame_ros.analysis.behaviour.steering_reversals import COGNITIVE, reversal_rate, VISUAL
-from crgame_ros.analysis.behaviour.take_overs import find_take_overs, TakeOverRequest
-from crgame_ros.analysis.behaviour.vehicle import (
-    DriverBehaviour,
-    EventReaction,
-    LaneChangeGap,
+from crgame_ros.analysis.behaviour.measures import MEASURES, STABLE_ACCELERATION
+from crgame_ros.analysis.behaviour.reactions import (
+    find_take_overs,
+    Reaction,
+    reaction_to,
+    ResponseLimits,
+    TakeOver,
+    TakeOverRequest,
+    USUAL_LIMITS,
 )
+from crgame_ros.analysis.behaviour.task_events import DetectionScore
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.events import FiredEvent, SpeedLimit
 from crgame_ros.geometry.outline import outline, placed
@@ -42,6 +53,117 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EventReaction:
+    """A driver's reaction to an event, with the event's time since the run's start [s]."""
+
+    event: str
+    event_s: float
+    reaction: Reaction
+
+
+@dataclass(frozen=True)
+class LaneChangeGap:
+    """
+    The gap that a driver accepted.
+
+    :param time_s: time at which the first wheel crossed, since the run's start; NaN if it was
+        across before [s]
+    :param side: `left` or `right`.
+    :param gap: in the lane entered.
+    :param leader: id of the leader in that lane, None without one; `follower` likewise.
+    """
+
+    time_s: float
+    side: str
+    gap: AcceptedGap
+    leader: str | None
+    follower: str | None
+
+
+@dataclass(frozen=True)
+class DriverBehaviour:
+    """
+    The behaviour of a vehicle's driver.
+
+    :param vehicle_id: id of the vehicle.
+    :param human: whether the game assigns a human driver; an AV is driven by its planner except
+        during take-overs, and its measures of motion cover both.
+    :param driven_s: time for which commands of a human drove it [s]
+    :param values: by name, the measures of `MEASURES` with one value per vehicle.
+    :param reactions: reactions to each event.
+    :param limits: limits that defined a response.
+    :param lane_changes: lane changes with the gaps accepted.
+    :param take_overs: take-overs of an AV.
+    :param times_s: (K) times of the steps, since the run's start [s]
+    :param tlc_s: (K) time to lane crossing; NaN off the lanes, inf without a crossing [s]
+    :param tlc_linear_s: (K) its linear form [s]
+    """
+
+    vehicle_id: str
+    human: bool
+    driven_s: float
+    values: dict[str, float]
+    reactions: tuple[EventReaction, ...]
+    limits: ResponseLimits
+    lane_changes: tuple[LaneChangeGap, ...]
+    take_overs: tuple[TakeOver, ...]
+    times_s: FloatArray
+    tlc_s: FloatArray
+    tlc_linear_s: FloatArray
+
+    def as_dict(self, series: bool = False) -> dict[str, object]:
+        """
+        Return the fields as a JSON-compatible dictionary; None where a value is not finite.
+
+        :param series: whether to include the time series.
+        """
+        found: dict[str, object] = {
+            'human': self.human, 'driven_s': self.driven_s,
+            'measures': {name: {'value': _finite(value), 'unit': MEASURES[name].unit}
+                         for name, value in self.values.items()},
+            'reactions': [{
+                'event': each.event, 'time_s': each.event_s,
+                'reaction_throttle': _finite(each.reaction.throttle_s),
+                'reaction_brake': _finite(each.reaction.brake_s),
+                'reaction_steering': _finite(each.reaction.steering_s)}
+                for each in self.reactions],
+            'response_limits': self.limits._asdict(),
+            'lane_changes': [_lane_change_values(each) for each in self.lane_changes],
+            'take_overs': [_take_over_values(each) for each in self.take_overs]}
+        if series:
+            found['series'] = {'time_s': self.times_s.tolist(),
+                               'tlc': list(map(_finite, self.tlc_s.tolist())),
+                               'tlc_linear': list(map(_finite, self.tlc_linear_s.tolist()))}
+        return found
+
+
+def _lane_change_values(change: LaneChangeGap) -> dict[str, object]:
+    found: dict[str, object] = {'time_s': _finite(change.time_s), 'side': change.side}
+    for name in ('leader', 'follower'):
+        neighbour: Neighbour | None = getattr(change.gap, name)
+        found |= {name: getattr(change, name),
+                  f'gap_to_{name}': None if neighbour is None else neighbour.gap,
+                  f'gap_accepted_{name}':
+                  None if neighbour is None else _finite(neighbour.time_gap_s)}
+    return found
+
+
+def _take_over_values(take_over: TakeOver) -> dict[str, object]:
+    request = take_over.request
+    return {'request': None if request is None else request.by,
+            'request_s': None if request is None else request.time_s,
+            'seat_s': take_over.seat_s, 'end_s': take_over.end_s,
+            'hands_on_s': _finite(take_over.hands_on_s),
+            'stable_s': _finite(take_over.stable_s),
+            'take_over_hands_on': _finite(take_over.to_hands_on_s),
+            'take_over_stable': _finite(take_over.to_stable_s)}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def limits_of(roads: RoadNetwork, visits: Sequence[LaneVisit], count: int,
@@ -245,3 +367,75 @@ def _gap(everybody: _Everybody, number: int, keeping: LaneKeeping,
         return None if neighbour is None else everybody.ids[others[neighbour.number]]
     return LaneChangeGap(float(everybody.times_s[change.wheel]), side, gap, named(gap.leader),
                          named(gap.follower))
+
+
+def behaviour_lines(found: DriverBehaviour) -> Iterator[str]:
+    """Yield lines on how a vehicle was driven; undefined values are left out."""
+    values = found.values
+    yield f'{found.vehicle_id} as it was driven'
+    for name in ('speed', 'acceleration', 'jerk'):
+        yield _line(f'{name}_mean', values[f'{name}_mean'],
+                    f'{name}, sd {values[f"{name}_sd"]:.2f}, '
+                    f'{values[f"{name}_min"]:.2f} to {values[f"{name}_max"]:.2f}')
+    lines = [
+        ('time_above_limit', f'of {values["time_with_limit"]:.1f} s with a speed limit'),
+        ('sdlp', f'of the centre, N - 1; lane changes cut out: {values["lane_changes"]:.0f}'),
+        ('tlc_min', 'smallest time to lane crossing, speed and yaw rate held'),
+        ('tlc_linear_min', 'the same by distance and speed towards the boundary'),
+        ('srr_visual', _setting(VISUAL)), ('srr_cognitive', _setting(COGNITIVE)),
+        *((f'{pedal}_applications', f'applied {100.0 * values[f"{pedal}_share"]:.0f} % of the '
+           'time') for pedal in ('throttle', 'brake'))]
+    for name, text in lines:
+        if math.isfinite(values[name]):
+            yield _line(name, values[name], text)
+    for each in found.reactions:
+        for name, value in zip(('throttle', 'brake', 'steering'), each.reaction, strict=True):
+            if math.isfinite(value):
+                yield _line(f'reaction_{name}', value, f'after {each.event} at '
+                            f'{each.event_s:.1f} s')
+    for change in found.lane_changes:
+        yield from _lane_change_lines(change)
+    for take_over in found.take_overs:
+        yield from _take_over_lines(take_over)
+
+
+def detection_lines(found: DetectionScore) -> Iterator[str]:
+    """Yield lines on a driver's results in a detection response task."""
+    yield f'{found.task}, answered in {found.seat}'
+    yield (f'  hit_rate             {found.hit_rate:9.2f}        {found.hits} hits, '
+           f'{found.misses} misses, {found.premature} premature, {found.unrequested} unrequested')
+    if found.hits:
+        yield (f'  response_mean        {found.response_mean_s:9.2f} s      median '
+               f'{found.response_median_s:.2f}, by the page that showed the light')
+
+
+def _line(name: str, value: float, text: str) -> str:
+    return f'  {name:<21}{value:9.2f} {MEASURES[name].unit:<6} {text}'.rstrip()
+
+
+def _setting(setting: ReversalSetting) -> str:
+    return f'steering reversals of {setting.gap_deg:g} degrees, {setting.cutoff_hz:g} Hz'
+
+
+def _lane_change_lines(change: LaneChangeGap) -> Iterator[str]:
+    if math.isnan(change.time_s):
+        return
+    where = f'to the {change.side} at {change.time_s:.1f} s'
+    told = False
+    for role in ('leader', 'follower'):
+        neighbour: Neighbour | None = getattr(change.gap, role)
+        if neighbour is not None and math.isfinite(neighbour.time_gap_s):
+            told = True
+            yield _line(f'gap_accepted_{role}', neighbour.time_gap_s,
+                        f'{getattr(change, role)} in {neighbour.gap:.1f} m, {where}')
+    if not told:
+        yield f'  lane change {where}: no vehicle near'
+
+
+def _take_over_lines(take_over: TakeOver) -> Iterator[str]:
+    by = '' if take_over.request is None else f', asked for by {take_over.request.by}'
+    yield f'  taken over from {take_over.seat_s:.1f} to {take_over.end_s:.1f} s{by}'
+    for name, value in (('take_over_hands_on', take_over.to_hands_on_s),
+                        ('take_over_stable', take_over.to_stable_s)):
+        if math.isfinite(value):
+            yield _line(name, value, 'after the request')

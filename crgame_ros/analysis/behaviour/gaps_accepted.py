@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import math
 from typing import NamedTuple
 
-from crgame_ros.analysis.behaviour.lane_strip import LaneStrip
+from crgame_ros.analysis.behaviour.lane_visits import LaneStrip
 import numpy as np
 from numpy.typing import NDArray
 

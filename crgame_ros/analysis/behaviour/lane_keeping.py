@@ -8,8 +8,14 @@ from itertools import pairwise
 import math
 from typing import NamedTuple
 
-from crgame_ros.analysis.behaviour.lane_strip import LaneStrip, strip_of, wheels_of
-from crgame_ros.analysis.behaviour.lane_visits import LaneEntry, LaneVisit, LaneVisits
+from crgame_ros.analysis.behaviour.lane_visits import (
+    LaneEntry,
+    LaneStrip,
+    LaneVisit,
+    LaneVisits,
+    strip_of,
+    wheels_of,
+)
 from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.roads.network import RoadNetwork

@@ -5,6 +5,14 @@
 import math
 from typing import NamedTuple
 
+from crgame_ros.analysis.behaviour.driver_controls import (
+    COGNITIVE,
+    PRESSED,
+    RELEASED_AGAIN,
+    ReversalSetting,
+    SHORTEST_S,
+    VISUAL,
+)
 from crgame_ros.analysis.behaviour.gaps_accepted import IN_LANE, NEAR
 from crgame_ros.analysis.behaviour.lane_keeping import (
     HORIZON_S,
@@ -12,19 +20,12 @@ from crgame_ros.analysis.behaviour.lane_keeping import (
     SIDEWAYS,
     STANDING,
 )
-from crgame_ros.analysis.behaviour.pedal_use import PRESSED, RELEASED_AGAIN
-from crgame_ros.analysis.behaviour.reactions import USUAL_LIMITS
-from crgame_ros.analysis.behaviour.steering_reversals import (
-    COGNITIVE,
-    ReversalSetting,
-    SHORTEST_S,
-    VISUAL,
-)
-from crgame_ros.analysis.behaviour.take_overs import (
+from crgame_ros.analysis.behaviour.reactions import (
     LONGEST_WAIT_S,
     PEDAL_INPUT,
     STABLE_S,
     STABLE_WHEEL_DEG,
+    USUAL_LIMITS,
     WHEEL_INPUT_DEG,
 )
 

@@ -8,8 +8,7 @@ from statistics import mean, median, stdev
 from typing import NamedTuple
 
 from crgame_ros.analysis.behaviour.driver_controls import DriverControls
-from crgame_ros.analysis.behaviour.reactions import reaction_to
-from crgame_ros.analysis.behaviour.take_overs import hands_on_after
+from crgame_ros.analysis.behaviour.reactions import hands_on_after, reaction_to
 from crgame_ros.game.task_documents import NOT_MEASURED, PageTimes, TaskEntry
 from crgame_ros.game.task_spec import DetectionResponse, TaskKind
 from crgame_ros.instruments.run_clock import run_times_s

@@ -8,7 +8,7 @@ from itertools import pairwise
 import math
 from typing import NamedTuple
 
-from crgame_ros.analysis.criticality.footprint_approach import time_to_contact
+from crgame_ros.analysis.criticality.nearby_footprints import time_to_contact
 import numpy as np
 from numpy.typing import NDArray
 import shapely

@@ -8,9 +8,19 @@ from typing import Any
 from crgame_ros.analysis.criticality.criticality import CHIEF, MEASURES
 from crgame_ros.analysis.report.planners_section import planners_compared
 from crgame_ros.analysis.report.run_section import title_of
-from crgame_ros.analysis.report.section import Dash, Plot, PlotLine, Section
+from crgame_ros.analysis.report.section import (
+    Dash,
+    free,
+    marked,
+    NOTHING,
+    number,
+    Plot,
+    PlotLine,
+    Section,
+    share,
+    table,
+)
 from crgame_ros.analysis.report.story_section import moment
-from crgame_ros.analysis.report.text import free, marked, NOTHING, number, share, table
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.vehicle.state import StateColumn
 

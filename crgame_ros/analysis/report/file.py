@@ -12,16 +12,18 @@ from crgame_ros.analysis.report.comparison import (
     letter,
     worst_of_all,
 )
-from crgame_ros.analysis.report.criticality_section import criticality_section
 from crgame_ros.analysis.report.document import Article, Page
-from crgame_ros.analysis.report.driving_section import driving_section, task_section
-from crgame_ros.analysis.report.motion_section import input_section, motion_section
-from crgame_ros.analysis.report.outcome_section import outcome_section
+from crgame_ros.analysis.report.driving_section import (
+    driving_section,
+    input_section,
+    motion_section,
+    task_section,
+)
+from crgame_ros.analysis.report.outcome_section import criticality_section, outcome_section
 from crgame_ros.analysis.report.planners_section import planners_section
 from crgame_ros.analysis.report.run_section import began, run_section, software_note, title_of
-from crgame_ros.analysis.report.section import Section
+from crgame_ros.analysis.report.section import free, NOTHING, number, Section
 from crgame_ros.analysis.report.story_section import story_section
-from crgame_ros.analysis.report.text import free, NOTHING, number
 from crgame_ros.analysis.report.timing_section import plan_section, timing_section
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.errors import InputError

@@ -1,17 +1,47 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The section on a run's events, contacts, violations and traffic rules."""
+"""What happened in a run: events, contacts, traffic rules, and how critical it was."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from crgame_ros.analysis.criticality.criticality import (
+    CHIEF,
+    EXPOSURES,
+    MEASURES,
+    VehicleCriticality,
+)
+from crgame_ros.analysis.criticality.headways import SHORT_S
+from crgame_ros.analysis.criticality.thresholds import Thresholds
+from crgame_ros.analysis.pictures.critical_moments import TWICE
+from crgame_ros.analysis.report.driving_section import dash_of
 from crgame_ros.analysis.report.run_section import named
-from crgame_ros.analysis.report.section import Section
+from crgame_ros.analysis.report.section import (
+    colours_of,
+    free,
+    marked,
+    note,
+    NOTHING,
+    number,
+    plain,
+    Plot,
+    PlotLimit,
+    PlotLine,
+    Section,
+    share,
+    table,
+)
 from crgame_ros.analysis.report.story_section import moment
-from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
 from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.units import unit_symbol
+import numpy as np
+from numpy.typing import NDArray
+
+# Longer times are not meaningful: plots initially leave them out [s].
+_SHOWN_S = 10.0
+# Greater decelerations are physically impossible [m/s^2].
+_SHOWN_DRAC = 12.0
 
 
 def outcome_section(run: Run) -> Section:
@@ -86,3 +116,94 @@ def _event_rows(run: Run) -> Iterator[Sequence[str]]:
     for spec in run.log.game.events:
         if all(event.name != spec.name for event in fired):
             yield free(spec.name), 'never', NOTHING
+
+
+def criticality_section(run: Run) -> Section:
+    """Return the section on criticality."""
+    limits = run.usual_criticality.thresholds
+    measured = run.usual_criticality.report()
+    html = note('Each row is the most critical value of the whole run, with which other, when; '
+                'the time leads to the picture of that moment. Bold and ‼ mark what is beyond a '
+                f'threshold: TTC below {limits.ttc_s:g} s, DRAC above {limits.drac:g} m/s², '
+                f'PET below {limits.pet_s:g} s.')
+    for vehicle in measured:
+        rows = list(_worst(run, vehicle, limits))
+        caption = f'Worst values of {named(run, vehicle.vehicle_id)}'
+        html += table(caption, ('measure', 'worst', 'unit', 'against', 'at [s]'), rows,
+                      'numbers worst') if rows else f'<p>{caption}: no other was near.</p>'
+    told = [each.told(limits) for each in EXPOSURES.values()]
+    html += table('Over the whole run', ('vehicle', *(
+        f'{each.label} [{each.symbol}]' for each in told)), [
+            (named(run, vehicle.vehicle_id), *map(number, vehicle.exposures.values()))
+            for vehicle in measured], 'numbers')
+    following = [row for vehicle in measured for row in _headways(run, vehicle)]
+    if following:
+        html += table('Following a leader: gaps bumper to bumper, headways front to front', (
+            'vehicle', 'value', 'mean', 'median', 'unit',
+            *(f'below {limit} s' for limit in SHORT_S)), following, 'numbers')
+    crossings = [row for vehicle in measured for row in _crossings(run, vehicle, limits)]
+    if crossings:
+        html += table('Ways that crossed: post-encroachment time (PET)', (
+            'vehicle', 'first', 'second', 'second entered at [s]', 'PET [s]'), crossings,
+            'numbers')
+    return Section('criticality', 'Criticality', html, tuple(_plots(run, limits)))
+
+
+def _worst(run: Run, vehicle: VehicleCriticality,
+           limits: Thresholds) -> Iterator[Sequence[str]]:
+    for name, measure in MEASURES.items():
+        worst = vehicle.worst.get(name)
+        if worst is None or name == TWICE or not measure.matters(worst.value):
+            continue
+        word = f'<span title="{plain(measure.definition)}">{measure.label}</span>'
+        yield (word, marked(number(worst.value), limits.exceeded(name, worst.value)),
+               measure.symbol, named(run, worst.other),
+               moment(run, worst.time_s))
+
+
+def _headways(run: Run, vehicle: VehicleCriticality) -> Iterator[Sequence[str]]:
+    if not vehicle.headways.following:
+        return
+    for values, unit in ((vehicle.headways.distances(), 'm'), (vehicle.headways.times(), 's')):
+        for name, each in values.items():
+            shares = (share(part, 1.0) if unit == 's' else '' for part in each.below)
+            yield (named(run, vehicle.vehicle_id), name.replace('_', ' '), number(each.mean),
+                   number(each.median), unit, *shares)
+
+
+def _crossings(run: Run, vehicle: VehicleCriticality,
+               limits: Thresholds) -> Iterator[Sequence[str]]:
+    ids = run.usual_criticality.ids
+    for each in vehicle.crossings:
+        yield (named(run, vehicle.vehicle_id), named(run, ids[each.first]),
+               named(run, ids[each.second]), moment(run, each.entered_s),
+               marked(('≈ ' if each.is_estimate else '') + number(each.pet_s),
+                      limits.exceeded('pet', each.pet_s)))
+
+
+def _plots(run: Run, limits: Thresholds) -> Iterator[Plot]:
+    lines_at = {'ttc': (PlotLimit(limits.ttc_s, 'critical below'),),
+                'drac': (PlotLimit(limits.drac, 'critical above'),),
+                'min_distance': (PlotLimit(0.0, 'contact'),), 'gap': (PlotLimit(0.0, 'contact'),)}
+    for name, measure in CHIEF.items():
+        values = run.course[name]
+        if not np.isfinite(values).any():
+            continue
+        unit = measure.symbol
+        yield Plot(name.replace('_', '-'), measure.label, unit, tuple(
+            PlotLine(item.id, run.times_s, values[i], colours_of(run)[item.id], dash_of(item.role))
+            for i, item in enumerate(run.log.vehicles)), lines_at.get(name, ()),
+            bounds=_bounds(name, unit, values, limits))
+
+
+def _bounds(name: str, unit: str, values: NDArray[np.float64],
+            limits: Thresholds) -> tuple[float, float] | None:
+    """Return a plot's initial bounds, if its extremes would hide the rest; None for all."""
+    finite = values[np.isfinite(values)]
+    most = float(finite.max())
+    if unit == 's':
+        least = min(0.0, float(finite.min()))
+        return (1.05 * least, _SHOWN_S) if most > _SHOWN_S else None
+    if name == 'drac':
+        return -0.2, 1.1 * max(limits.drac, min(most, _SHOWN_DRAC))
+    return None

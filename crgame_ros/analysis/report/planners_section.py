@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from crgame_ros.analysis.report.run_section import named
-from crgame_ros.analysis.report.section import Section
-from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
+from crgame_ros.analysis.report.section import free, note, NOTHING, number, plain, Section, table
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.scores.measures import SCORE_MEASURES
 from crgame_ros.analysis.scores.vehicle import VehicleScores

@@ -5,8 +5,16 @@
 from collections.abc import Iterator
 from datetime import datetime, UTC
 
-from crgame_ros.analysis.report.section import colours_of, Section
-from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
+from crgame_ros.analysis.report.section import (
+    colours_of,
+    free,
+    note,
+    NOTHING,
+    number,
+    plain,
+    Section,
+    table,
+)
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.objects import Role

@@ -7,12 +7,11 @@ from urllib.parse import quote
 
 from crgame_ros.analysis.pictures.critical_moments import (
     Moment,
+    nearest_moment,
 )
 from crgame_ros.analysis.pictures.frame_svg import frame_svg
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
-from crgame_ros.analysis.pictures.story_moments import nearest_moment
-from crgame_ros.analysis.report.section import Section
-from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain
+from crgame_ros.analysis.report.section import free, note, NOTHING, number, plain, Section
 from crgame_ros.analysis.runs.run import Run
 
 # Width of a picture [px].

@@ -6,8 +6,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from crgame_ros.analysis.report.run_section import named
-from crgame_ros.analysis.report.section import Plot, PlotLimit, PlotLine, Section
-from crgame_ros.analysis.report.text import free, note, NOTHING, number, share, table
+from crgame_ros.analysis.report.section import (
+    free,
+    note,
+    NOTHING,
+    number,
+    Plot,
+    PlotLimit,
+    PlotLine,
+    Section,
+    share,
+    table,
+)
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.recording.plan_outcome import PlanOutcome
 from crgame_ros.timing.late_step import CAUSE_WORDS

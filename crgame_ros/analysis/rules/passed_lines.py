@@ -1,22 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which lines a vehicle passed at red, and which stop signs without a halt."""
+"""The lines at which vehicles halt, and which of them a vehicle passed without."""
 
 from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
 
-from commonroad.scenario.lanelet import LaneletNetwork
+from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from commonroad.scenario.scenario import Scenario
+from commonroad.scenario.traffic_light import TrafficLight
 from crgame_ros.analysis.behaviour.lane_visits import LaneVisits
-from crgame_ros.analysis.rules.line_crossings import line_crossings, LineCrossing
-from crgame_ros.analysis.rules.stop_lines import find_stop_lines, StopLine
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signals import governing_lights, INACTIVE, RED_STATES, TrafficLights
-from crgame_ros.roads.signs import has_arrow, SIGN_REACH
+from crgame_ros.roads.signs import has_arrow, has_stop_sign, lights_of, SIGN_REACH, stop_line_ends
 from crgame_ros.vehicle.state import STANDING, StateColumn
 import numpy as np
 from numpy.typing import NDArray
+import shapely
 
 FloatArray = NDArray[np.float64]
 Kind = Literal['red light', 'stop sign']
@@ -25,6 +25,140 @@ Kind = Literal['red light', 'stop sign']
 FAR = 60.0
 # All of a junction is within this distance of a line before it [m].
 AROUND = 250.0
+# A front that passes a line up to this far beside it has passed it [m]: files draw some short.
+ASIDE = 0.3
+# Least cosine of the angle between a vehicle that drives over a line and the lane.
+ALONG = 0.5
+# Lines of one halt: those side by side, and of lanes that begin together [m].
+TOGETHER = 3.0
+
+
+class StopLine(NamedTuple):
+    """
+    A line across a lane.
+
+    :param lanelet: id of the lanelet.
+    :param middle: (2) [m]
+    :param ahead: (2) unit vector across the line, in the lane's direction.
+    :param half: half of its length [m]
+    :param lights: that govern it.
+    :param stop_sign: whether a stop sign stands there.
+    :param begins: whether the lane begins here, and others may begin with it.
+    """
+
+    lanelet: int
+    middle: FloatArray
+    ahead: FloatArray
+    half: float
+    lights: tuple[TrafficLight, ...]
+    stop_sign: bool
+    begins: bool
+
+
+def find_stop_lines(network: LaneletNetwork) -> tuple[StopLine, ...]:
+    """List the lines of a map that have lights or a stop sign."""
+    inner = _first_of_junctions(network)
+    found = []
+    for lanelet in network.lanelets:
+        lights, sign = lights_of(lanelet, network), has_stop_sign(lanelet, network)
+        if lights or sign:
+            # A light of a lane inside a junction stands before it, not at its far side.
+            begins = lanelet.stop_line is None and not sign and lanelet.lanelet_id in inner
+            found.append(_line(lanelet, begins, lights, sign))
+    return tuple(found)
+
+
+def _first_of_junctions(network: LaneletNetwork) -> set[int]:
+    """Return the lanelets that the file names as first of a junction but not as incoming."""
+    incomings = [each for intersection in network.intersections
+                 for each in intersection.incomings]
+    first = {i for each in incomings for names in (
+        each.successors_left, each.successors_straight, each.successors_right)
+        for i in names or ()}
+    return first - {i for each in incomings for i in each.incoming_lanelets or ()}
+
+
+def _line(lanelet: Lanelet, begins: bool, lights: Sequence[TrafficLight],
+          sign: bool) -> StopLine:
+    """Return a lanelet's stop line, or the line across its start or end."""
+    end = 0 if begins else -1
+    if lanelet.stop_line is not None:
+        left, right = stop_line_ends(lanelet)
+    else:
+        left, right = lanelet.left_vertices[end, :2], lanelet.right_vertices[end, :2]
+    across = right - left
+    length = float(np.hypot(*across))
+    ahead = np.array((-across[1], across[0])) / max(length, 1e-9)
+    # Files give the ends of a line in either order.
+    along = np.diff(lanelet.center_vertices[:2] if begins else lanelet.center_vertices[-2:],
+                    axis=0)[0, :2]
+    return StopLine(int(lanelet.lanelet_id), 0.5 * (left + right),
+                    ahead if along @ ahead >= 0.0 else -ahead, 0.5 * length, tuple(lights), sign,
+                    begins)
+
+
+class LineCrossing(NamedTuple):
+    """
+    A line that a front passed.
+
+    :param line: its index in the lines.
+    :param row: last state before it.
+    :param part: of the step behind that state until the front was at the line, 0 to 1.
+    :param aside: distance beyond the end of the line, 0 on it [m]
+    """
+
+    line: int
+    row: int
+    part: float
+    aside: float
+
+
+def line_crossings(lines: Sequence[StopLine], poses: FloatArray, front: float,
+                   jumps: Sequence[int]) -> list[list[LineCrossing]]:
+    """
+    Find the lines that a vehicle drove over in the direction of their lanes, in order.
+
+    :param poses: (K, 3) of its reference point, in the map's coordinates.
+    :param front: from that point to the front bumper [m]
+    :param jumps: rows at which it has just been put elsewhere.
+    :return: for each halt the lines that were passed there: one, or several where lines lie side
+        by side or upon each other.
+    """
+    if not lines or len(poses) < 2:
+        return []
+    fronts = shifted(poses, front)[:, :2]
+    found = sorted(_crossings(lines, poses, fronts, jumps), key=lambda x: (x.row, x.part))
+    gone = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(fronts, axis=0).T))))
+    halts: list[list[LineCrossing]] = []
+    for each in found:
+        if halts and gone[each.row] - gone[halts[-1][0].row] < TOGETHER:
+            halts[-1].append(each)
+        else:
+            halts.append([each])
+    return halts
+
+
+def _crossings(lines: Sequence[StopLine], poses: FloatArray, fronts: FloatArray,
+               jumps: Sequence[int]) -> Iterator[LineCrossing]:
+    middle, ahead, half = (np.array([getattr(line, name) for line in lines])
+                           for name in ('middle', 'ahead', 'half'))
+    reach = (half + ASIDE)[:, None] * np.column_stack((-ahead[:, 1], ahead[:, 0]))
+    tree = shapely.STRtree(shapely.linestrings(np.stack((middle - reach, middle + reach), axis=1)))
+    steps = shapely.linestrings(np.stack((fronts[:-1], fronts[1:]), axis=1))
+    # By their boxes; which of these steps pass a line is computed below.
+    row, line = tree.query(steps)
+    before, after = (np.einsum('ij,ij->i', fronts[at] - middle[line], ahead[line])
+                     for at in (row, row + 1))
+    along = np.cos(poses[row, 2]) * ahead[line, 0] + np.sin(poses[row, 2]) * ahead[line, 1]
+    # A front that halts on a line passes it when it gets there, not once more when it leaves.
+    passes = (before < 0.0) & (after >= 0.0) & (along > ALONG) & ~np.isin(row + 1, jumps)
+    row, line, before, after = row[passes], line[passes], before[passes], after[passes]
+    part = before / (before - after)
+    place = fronts[row] + part[:, None] * (fronts[row + 1] - fronts[row]) - middle[line]
+    across = place[:, 1] * ahead[line, 0] - place[:, 0] * ahead[line, 1]
+    aside = np.maximum(np.abs(across) - half[line], 0.0)
+    for i in np.flatnonzero(aside <= ASIDE).tolist():
+        yield LineCrossing(int(line[i]), int(row[i]), float(part[i]), float(aside[i]))
 
 
 class DrivenTrack(NamedTuple):

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # They take a second to import, and only measures need them.
-    from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
+    from crgame_ros.analysis.behaviour.driver import DriverBehaviour
     from crgame_ros.analysis.criticality.criticality import Criticality, VehicleCriticality
     from crgame_ros.analysis.pictures.critical_moments import Moment, Touch
     from crgame_ros.analysis.pictures.scene_frame import FrameScene
@@ -342,7 +342,7 @@ class Run:
     @cached_property
     def story(self) -> 'tuple[Moment, ...]':
         """Find the moments that a report shows, in order of time."""
-        from crgame_ros.analysis.pictures.story_moments import story_moments
+        from crgame_ros.analysis.pictures.critical_moments import story_moments
         return story_moments(self.record, self.usual_criticality, self.moments)
 
     @cached_property

@@ -5,7 +5,7 @@
 from dataclasses import dataclass
 import math
 
-from crgame_ros.analysis.scores.lanes_driven import LanesDriven
+from crgame_ros.analysis.scores.route_progress import LanesDriven
 from crgame_ros.analysis.scores.scored_drive import ScoredDrive, Track, TrackKind
 from crgame_ros.drivability.contact import Kind
 from crgame_ros.geometry.outline import outline, placed

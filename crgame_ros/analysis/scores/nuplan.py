@@ -15,8 +15,14 @@ from crgame_ros.analysis.scores.collisions_by_kind import (
     find_collisions,
     JudgedCollision,
 )
-from crgame_ros.analysis.scores.lanes_driven import find_lanes, is_two_way, LanesDriven
-from crgame_ros.analysis.scores.route_progress import ComparedRoute, progress_ratio, route_of
+from crgame_ros.analysis.scores.route_progress import (
+    ComparedRoute,
+    find_lanes,
+    is_two_way,
+    LanesDriven,
+    progress_ratio,
+    route_of,
+)
 from crgame_ros.analysis.scores.scored_drive import ScoredDrive, Track, TrackKind
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.outline import outline, placed

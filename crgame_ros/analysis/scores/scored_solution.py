@@ -14,9 +14,7 @@ from commonroad.common.solution import (
 )
 from commonroad.planning.planning_problem import PlanningProblem, PlanningProblemSet
 from commonroad.scenario.trajectory import Trajectory
-from crgame_ros.analysis.scores.goal_record import find_goal
 from crgame_ros.analysis.scores.nuplan import NuplanScore, NuplanScorer
-from crgame_ros.analysis.scores.planner import PlannerScores, REMARKS
 from crgame_ros.analysis.scores.scored_drive import drive_among, ScoredDrive, Track
 from crgame_ros.analysis.scores.scored_drives import recorded_expert
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
@@ -27,7 +25,7 @@ from crgame_ros.analysis.scores.solution_judge import (
     speeds_of,
 )
 from crgame_ros.analysis.scores.trajectory_feasibility import check_feasibility, simulated
-from crgame_ros.analysis.scores.vehicle import VehicleScores
+from crgame_ros.analysis.scores.vehicle import find_goal, PlannerScores, REMARKS, VehicleScores
 from crgame_ros.errors import InputError, one_line
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.geometry.shape import Shape

@@ -2,16 +2,67 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scores of one vehicle: nuPlan's and CommonRoad's, with its goal and its plans."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from crgame_ros.analysis.scores.goal_record import GoalRecord
+from commonroad.planning.planning_problem import PlanningProblem
+from commonroad.scenario.scenario import ScenarioID
+from commonroad.scenario.state import KSState
+from crgame_ros.analysis.scores.commonroad_costs import checker_version
+from crgame_ros.analysis.scores.driven_states import goal_step
 from crgame_ros.analysis.scores.measures import SCORE_MEASURES
 from crgame_ros.analysis.scores.nuplan import NuplanScore
 from crgame_ros.recording.plan_outcome import PlanOutcome
+from crgame_ros.scenario.exact_values import group_outline
+import numpy as np
+import shapely
 
-if TYPE_CHECKING:  # The checker takes a second to import, and reports of runs do without it.
+if TYPE_CHECKING:
     from crgame_ros.analysis.scores.solution_judge import SolutionScores
+
+REMARKS = (
+    'costs are those of the code: its weights and the table of the benchmark site differ; '
+    'SM1, SM2 and WX1 take the path length in the code',)
+
+
+@dataclass(frozen=True)
+class GoalRecord:
+    """
+    A vehicle's way to its goal.
+
+    :param step: number of the first state that met the goal; None: none did.
+    :param reached_s: time at which a state first met the goal, since the run's start; None: never
+        [s]
+    :param last_distance: from the centre to the goal's area at the end; None: it has no area [m]
+    :param least_distance: smallest such distance of the run [m]
+    """
+
+    step: int | None
+    reached_s: float | None
+    last_distance: float | None
+    least_distance: float | None
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the fields as a JSON-compatible dictionary."""
+        return {'reached_s': self.reached_s, 'last_distance_m': self.last_distance,
+                'least_distance_m': self.least_distance}
+
+
+def find_goal(problem: PlanningProblem, states: Sequence[KSState], dt_s: float) -> GoalRecord:
+    """
+    Find when a drive reached its goal, and how near it came.
+
+    :param states: states from time step 0 on.
+    """
+    step = goal_step(problem, list(states))
+    points = shapely.points([state.position for state in states])
+    areas = [group_outline(state.position) for state in problem.goal.state_list
+             if getattr(state, 'position', None) is not None]
+    away = np.min([shapely.distance(points, area) for area in areas], axis=0) if areas else None
+    return GoalRecord(step, None if step is None else step * dt_s,
+                      None if away is None else float(away[-1]),
+                      None if away is None else float(away.min()))
 
 
 @dataclass(frozen=True)
@@ -66,3 +117,26 @@ class VehicleScores:
                                  ('age_ms', self.plans.age_ms)):
                 found[name] = None if spread is None else spread['p50']
         return found
+
+
+@dataclass(frozen=True)
+class PlannerScores:
+    """
+    The scores of a run, or of solutions.
+
+    :param scenario_id: id of the scenario that the vehicles or solutions drove in.
+    :param xml_text: that scenario.
+    :param vehicles: scores of each vehicle.
+    :param remarks: notes, one line each.
+    """
+
+    scenario_id: ScenarioID
+    xml_text: str
+    vehicles: tuple[VehicleScores, ...]
+    remarks: tuple[str, ...] = REMARKS
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the scores as a JSON-compatible dictionary: SI units, times since the start."""
+        return {'scenario': str(self.scenario_id), 'checker': checker_version(),
+                'vehicles': [each.as_dict() for each in self.vehicles],
+                'remarks': list(self.remarks)}

@@ -15,9 +15,9 @@ from crgame_ros.analysis.tables.column import (
     NUMBER,
     RUN,
     TableDeclaration,
+    TablePart,
     TEXT,
 )
-from crgame_ros.analysis.tables.part import TablePart
 from crgame_ros.analysis.tables.writer import TableRows
 
 _PER_VEHICLE = tuple(name for name, measure in MEASURES.items() if measure.per == 'vehicle')

@@ -7,20 +7,18 @@ from typing import get_args
 
 from crgame_ros.analysis.behaviour.gaze import (
     GazeSamples,
+    glance_sums,
+    glances,
+    LONGEST_GAP_S,
     looked_at,
     LookedAt,
     LOST,
     OFF_VIEW,
     ROAD,
+    SHORTEST_S,
     SURROUNDINGS,
     TOLERANCE_S,
     UNKNOWN,
-)
-from crgame_ros.analysis.behaviour.glances import (
-    glance_sums,
-    glances,
-    LONGEST_GAP_S,
-    SHORTEST_S,
 )
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (

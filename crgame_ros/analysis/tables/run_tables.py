@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from crgame_ros.analysis.runs.run import Run, RunProgress, Scoring
 from crgame_ros.analysis.tables.behaviour import BEHAVIOUR_TABLES, write_behaviour
-from crgame_ros.analysis.tables.column import TableDeclaration
+from crgame_ros.analysis.tables.column import part_rows, TableDeclaration
 from crgame_ros.analysis.tables.data_package import (
     CREATOR,
     data_package,
@@ -20,7 +20,6 @@ from crgame_ros.analysis.tables.data_package import (
 from crgame_ros.analysis.tables.gaze import GAZE_TABLES, write_gaze
 from crgame_ros.analysis.tables.instruments import INSTRUMENT_TABLES, write_instruments
 from crgame_ros.analysis.tables.pairs import CROSSINGS, PAIRS, write_criticality
-from crgame_ros.analysis.tables.part import part_rows
 from crgame_ros.analysis.tables.plans import plan_rows, PLANS
 from crgame_ros.analysis.tables.runs import RUN_PARTS, RUNS
 from crgame_ros.analysis.tables.states import state_rows, STATES

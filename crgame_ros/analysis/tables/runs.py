@@ -7,8 +7,15 @@ import hashlib
 import json
 
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TEXT
-from crgame_ros.analysis.tables.part import declare, TablePart
+from crgame_ros.analysis.tables.column import (
+    Column,
+    declare,
+    INTEGER,
+    NUMBER,
+    RUN,
+    TablePart,
+    TEXT,
+)
 from crgame_ros.game.objects import Role
 
 UNTIMED = 'its timing was not recorded, as that of an offline run'

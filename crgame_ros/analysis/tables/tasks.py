@@ -8,15 +8,16 @@ from crgame_ros.analysis.behaviour.task_events import detection_scores, task_eve
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
     Column,
+    declare,
     INTEGER,
     known,
     NUMBER,
     RUN,
     step_columns,
     TableDeclaration,
+    TablePart,
     TEXT,
 )
-from crgame_ros.analysis.tables.part import declare, TablePart
 from crgame_ros.analysis.tables.writer import TableRows
 from crgame_ros.game.events import ACTIONS
 

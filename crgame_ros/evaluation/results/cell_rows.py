@@ -12,10 +12,10 @@ from crgame_ros.analysis.tables.column import (
     FLAG,
     INTEGER,
     NUMBER,
+    part_rows,
     TableDeclaration,
     TEXT,
 )
-from crgame_ros.analysis.tables.part import part_rows
 from crgame_ros.analysis.tables.vehicles import VEHICLE_PARTS
 from crgame_ros.simulation.contacts import Contact
 from crgame_ros.simulation.offline import OfflineResult

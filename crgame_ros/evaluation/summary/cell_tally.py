@@ -11,11 +11,11 @@ from crgame_ros.evaluation.summary.cell_block import (
     CellBlock,
     CellBlocks,
     CellGroups,
+    EvaluatedParts,
     IntArray,
     mixed,
 )
 from crgame_ros.evaluation.summary.cluster_means import CellClusters, CountedCells
-from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
 from crgame_ros.evaluation.summary.summary import FailureReason
 import numpy as np
 from numpy.typing import NDArray

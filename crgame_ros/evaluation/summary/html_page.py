@@ -8,10 +8,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crgame_ros.analysis.report.document import Article, Page
-from crgame_ros.analysis.report.section import Section
-from crgame_ros.analysis.report.svg_axis import axis_ticks, tick_text
-from crgame_ros.analysis.report.text import free, note, plain, table
-from crgame_ros.evaluation.summary.markdown import relative
+from crgame_ros.analysis.report.section import (
+    axis_ticks,
+    free,
+    note,
+    plain,
+    Section,
+    table,
+    tick_text,
+)
 from crgame_ros.evaluation.summary.measures import SummaryMeasure
 from crgame_ros.evaluation.summary.summary import (
     Estimate,
@@ -30,6 +35,7 @@ from crgame_ros.evaluation.summary.tables import (
     SummaryCell,
     SummaryTable,
 )
+from crgame_ros.evaluation.summary.text import relative
 from crgame_ros.version import __version__
 from crgame_ros.whole_file import write_text
 

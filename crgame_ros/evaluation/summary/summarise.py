@@ -14,7 +14,12 @@ from pathlib import Path
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.evaluation.results.cell_rows import TEXT_FACTORS
-from crgame_ros.evaluation.summary.cell_block import BLOCK_CELLS, CellBlock, CellBlocks
+from crgame_ros.evaluation.summary.cell_block import (
+    BLOCK_CELLS,
+    CellBlock,
+    CellBlocks,
+    EvaluatedParts,
+)
 from crgame_ros.evaluation.summary.cell_tally import CellTally, paired_cells, tally_cells
 from crgame_ros.evaluation.summary.cluster_means import (
     CellClusters,
@@ -24,7 +29,6 @@ from crgame_ros.evaluation.summary.cluster_means import (
     holm,
     IntArray,
 )
-from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
 from crgame_ros.evaluation.summary.measures import (
     chosen_measures,
     MEASURES,

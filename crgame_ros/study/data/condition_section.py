@@ -8,8 +8,15 @@ import math
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-from crgame_ros.analysis.report.svg_axis import axis_ticks, tick_text
-from crgame_ros.analysis.report.text import free, note, number, plain, table
+from crgame_ros.analysis.report.section import (
+    axis_ticks,
+    free,
+    note,
+    number,
+    plain,
+    table,
+    tick_text,
+)
 from crgame_ros.analysis.tables.column import Column, NUMBER
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.trials_table import measure_columns, TASK_COLUMNS

@@ -8,7 +8,7 @@ from pathlib import Path
 import statistics
 from typing import Any
 
-from crgame_ros.analysis.report.text import free, note, number, plain, table
+from crgame_ros.analysis.report.section import free, note, number, plain, table
 from crgame_ros.errors import InputError
 from crgame_ros.schema.writing import write
 from crgame_ros.software import software_with_commit

@@ -4,7 +4,7 @@
 
 from collections import Counter
 
-from crgame_ros.analysis.report.text import note, number, plain, table
+from crgame_ros.analysis.report.section import note, number, plain, table
 from crgame_ros.study.data.participant_record import Part
 from crgame_ros.study.data.study_data import StudyData
 

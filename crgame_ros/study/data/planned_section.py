@@ -4,7 +4,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
+from crgame_ros.analysis.report.section import free, note, NOTHING, number, plain, table
 from crgame_ros.errors import InputError
 from crgame_ros.study.analysis.mixed_model import fit_models, missing_extra, MixedModel
 from crgame_ros.study.analysis.paired_test import PairedTest

@@ -4,8 +4,16 @@
 
 from collections.abc import Callable, Sequence
 
-from crgame_ros.analysis.report.svg_axis import axis_ticks, tick_text
-from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
+from crgame_ros.analysis.report.section import (
+    axis_ticks,
+    free,
+    note,
+    NOTHING,
+    number,
+    plain,
+    table,
+    tick_text,
+)
 from crgame_ros.study.data.staircases_table import counted_tracks, STAIRCASES
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.staircase import StaircaseTrial, Track

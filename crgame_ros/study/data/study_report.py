@@ -7,8 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from crgame_ros.analysis.report.document import Article, Page
-from crgame_ros.analysis.report.section import Section
-from crgame_ros.analysis.report.text import free, marked, note, NOTHING, number, plain, table
+from crgame_ros.analysis.report.section import (
+    free,
+    marked,
+    note,
+    NOTHING,
+    number,
+    plain,
+    Section,
+    table,
+)
 from crgame_ros.study.data.condition_section import condition_section
 from crgame_ros.study.data.paper_section import paper_section
 from crgame_ros.study.data.participant_flow import flow_table

@@ -9,9 +9,8 @@ import json
 import math
 from typing import Any
 
-from crgame_ros.analysis.behaviour.driver import measure_behaviour
+from crgame_ros.analysis.behaviour.driver import DriverBehaviour, measure_behaviour
 from crgame_ros.analysis.behaviour.measures import MEASURES
-from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.game.file import load_game
 from crgame_ros.geometry.angles import wrap_pi_array

@@ -5,7 +5,7 @@
 import math
 
 from crgame_ros.analysis.behaviour.gaps_accepted import AcceptedGap, gap_in_lane
-from crgame_ros.analysis.behaviour.lane_strip import LaneStrip
+from crgame_ros.analysis.behaviour.lane_visits import LaneStrip
 from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.outline import placed_at
 import numpy as np

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Glances of made gaze, against numbers by hand."""
 
-from crgame_ros.analysis.behaviour.gaze import LookedAt
-from crgame_ros.analysis.behaviour.glances import Area, glance_sums, glances, GlanceSum
+from crgame_ros.analysis.behaviour.gaze import Area, glance_sums, glances, GlanceSum, LookedAt
 import numpy as np
 import pytest
 

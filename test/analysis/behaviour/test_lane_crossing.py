@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from crgame_ros.analysis.behaviour.lane_keeping import HORIZON_S, lane_crossing, LaneCrossing
-from crgame_ros.analysis.behaviour.lane_strip import LaneStrip, wheels_of
+from crgame_ros.analysis.behaviour.lane_visits import LaneStrip, wheels_of
 from crgame_ros.geometry.curve import Curve
 from crgame_ros.vehicle.parameters import VehicleParameters
 import numpy as np

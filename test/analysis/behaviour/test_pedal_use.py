@@ -4,7 +4,7 @@
 
 import math
 
-from crgame_ros.analysis.behaviour.pedal_use import applied, spread_of, use_of_pedal
+from crgame_ros.analysis.behaviour.driver_controls import applied, spread_of, use_of_pedal
 import numpy as np
 import pytest
 

@@ -4,10 +4,10 @@
 
 import math
 
-from crgame_ros.analysis.behaviour.driver_controls import DriverControls
-from crgame_ros.analysis.behaviour.steering_reversals import (
+from crgame_ros.analysis.behaviour.driver_controls import (
     COGNITIVE,
     count_reversals,
+    DriverControls,
     reversal_rate,
     ReversalSetting,
     stationary_points,

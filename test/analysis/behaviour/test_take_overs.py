@@ -5,7 +5,7 @@
 import math
 
 from crgame_ros.analysis.behaviour.driver_controls import DriverControls
-from crgame_ros.analysis.behaviour.take_overs import find_take_overs, TakeOverRequest
+from crgame_ros.analysis.behaviour.reactions import find_take_overs, TakeOverRequest
 import numpy as np
 from numpy.typing import NDArray
 import pytest

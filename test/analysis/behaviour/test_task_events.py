@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 import math
 
-from crgame_ros.analysis.behaviour.driver import measure_behaviour
+from crgame_ros.analysis.behaviour.driver import detection_lines, measure_behaviour
 from crgame_ros.analysis.behaviour.task_events import detection_scores, task_events, TaskEvent
-from crgame_ros.analysis.behaviour.text import detection_lines
 from crgame_ros.analysis.report.driving_section import task_section
 from crgame_ros.analysis.run_measures import measure_run
 from crgame_ros.analysis.runs.run import Run

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Predictions agree with motion on circles and with braking, and motion goes on after a run."""
 
-from crgame_ros.analysis.blame.others import poses_at, predicted
+from crgame_ros.analysis.blame.blame import poses_at, predicted
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.geometry.shape import Shape

@@ -2,11 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Footprints that approach each other, against a search by shapely in small steps."""
 
-from crgame_ros.analysis.criticality.footprint_approach import (
-    approach,
-    distance,
-    time_to_contact,
-)
+from crgame_ros.analysis.criticality.nearby_footprints import approach, distance, time_to_contact
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -6,7 +6,7 @@ import base64
 from itertools import pairwise
 import json
 
-from crgame_ros.analysis.report.plot_data import (
+from crgame_ros.analysis.report.document import (
     ALL_POINTS,
     columns_for,
     encoded,

@@ -5,7 +5,7 @@
 from html.parser import HTMLParser
 import math
 
-from crgame_ros.analysis.report.text import free, number, plain, share, table
+from crgame_ros.analysis.report.section import free, number, plain, share, table
 import pytest
 
 

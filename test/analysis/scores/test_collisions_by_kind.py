@@ -7,7 +7,7 @@ from pathlib import Path
 import sys
 
 from crgame_ros.analysis.scores.collisions_by_kind import find_collisions
-from crgame_ros.analysis.scores.lanes_driven import find_lanes
+from crgame_ros.analysis.scores.route_progress import find_lanes
 from crgame_ros.analysis.scores.scored_drive import kind_of_type, ScoredDrive, Track
 from crgame_ros.drivability.contact import Course, kind_of, touched_side
 from crgame_ros.roads.network import RoadNetwork

@@ -34,9 +34,9 @@ from commonroad.scenario.obstacle import (
 from commonroad.scenario.state import CustomState, InitialState, InputState, KSState, PMState
 from commonroad.scenario.trajectory import Trajectory
 from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
-from crgame_ros.analysis.scores.planner import VehicleScores
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.scored_solution import score_solutions
+from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.errors import InputError
 import numpy as np
 import pytest

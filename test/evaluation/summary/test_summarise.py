@@ -8,8 +8,7 @@ from pathlib import Path
 
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.results.cell_rows import FACTORS
-from crgame_ros.evaluation.summary.cell_block import CellBlocks
-from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
+from crgame_ros.evaluation.summary.cell_block import CellBlocks, EvaluatedParts
 from crgame_ros.evaluation.summary.measures import MEASURES
 from crgame_ros.evaluation.summary.summarise import summarise
 from crgame_ros.evaluation.summary.summary import Estimate, Summary

@@ -9,18 +9,17 @@ import json
 from pathlib import Path
 import re
 
-from crgame_ros.evaluation.summary.command import add_summary_arguments, summarise_command
+from crgame_ros.evaluation.evaluate_command import add_summary_arguments, summarise_command
 from crgame_ros.evaluation.summary.html_page import (
     interval_svg,
     PlottedInterval,
     write_summary_page,
 )
-from crgame_ros.evaluation.summary.markdown import summary_markdown
 from crgame_ros.evaluation.summary.measures import MEASURES
 from crgame_ros.evaluation.summary.summarise import summarise
 from crgame_ros.evaluation.summary.summary import Summary
 from crgame_ros.evaluation.summary.tables import quantity
-from crgame_ros.evaluation.summary.text import summary_text
+from crgame_ros.evaluation.summary.text import summary_markdown, summary_text
 from evaluation_rows import Evaluation, many
 import numpy as np
 from page_reader import Page
