@@ -17,7 +17,7 @@ from broken_text import broken_bytes, broken_json, broken_yaml
 from crgame_ros import cli
 from crgame_ros.analysis.outcome_line import NO_PLANS
 from crgame_ros.driver.device_map import load_device_map
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.errors import InputError
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import config_directory, scenarios_directory

@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'browser')
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from crgame_ros.cockpit.access import reachable_addresses  # noqa: E402, I100
-from crgame_ros.instruments.loopback import CONFIGURATION  # noqa: E402
+from crgame_ros.instruments.outlets import CONFIGURATION  # noqa: E402
 from crgame_ros.yaml_text import read_yaml  # noqa: E402
 import pyarrow.parquet as pq  # noqa: E402
 from study_people import study_session, StudySession  # noqa: E402

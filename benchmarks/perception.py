@@ -15,9 +15,8 @@ from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.messages.joints import JointSeries, object_joint_names, vehicle_joint_names
 from crgame_ros.occupancy.occupancy import OccupancyGrid
-from crgame_ros.perception.bodies import SensedBodies
 from crgame_ros.perception.perception import Perception
-from crgame_ros.perception.sensors import create_sensor
+from crgame_ros.perception.sensors import create_sensor, SensedBodies
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np

@@ -9,7 +9,7 @@ import time
 from typing import Any
 
 from crgame_ros.driver.device_map import load_device_map
-from crgame_ros.driver.timeline_file import read_timeline
+from crgame_ros.driver.timeline import read_timeline
 from crgame_ros.errors import InputError, LONGEST
 from crgame_ros.game.file import load_game
 from crgame_ros.occupancy.map_file import read_map_file

@@ -14,8 +14,7 @@ import ssl
 import struct
 from urllib.parse import urlsplit
 
-from crgame_ros.cockpit.invitations import Invitations, UNKNOWN
-from crgame_ros.cockpit.rights import ALL_RIGHTS, Rights
+from crgame_ros.cockpit.rights import ALL_RIGHTS, Invitations, Rights, UNKNOWN
 from crgame_ros.errors import InputError
 
 TOKEN_BYTES = 24

@@ -13,7 +13,7 @@ import ssl
 import subprocess
 
 from crgame_ros.cockpit.access import Access, is_loopback, new_token, reachable_addresses
-from crgame_ros.cockpit.invitations import Invitations
+from crgame_ros.cockpit.rights import Invitations
 from crgame_ros.errors import CrgameError, InputError
 
 _DAYS = 30

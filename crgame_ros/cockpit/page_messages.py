@@ -16,7 +16,7 @@ from crgame_ros.game.task_documents import (
 )
 from crgame_ros.game.view_documents import ViewPicture
 from crgame_ros.schema.messages import Flag, HexKey, Message, MessageId, MessageReader
-from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
+from crgame_ros.timing.time_controller import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 from pydantic import (
     AfterValidator,
     BeforeValidator,

@@ -10,7 +10,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.cockpit.job_loop import serve_jobs
+from crgame_ros.cockpit.job_process import serve_jobs
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.driver.source import COCKPIT

@@ -17,8 +17,7 @@ from crgame_ros.analysis.criticality.rows import criticality_rows, CRITICALITY_T
 from crgame_ros.cockpit.message_frames import MessageFrames
 from crgame_ros.cockpit.page_messages import Command
 from crgame_ros.cockpit.replay_chunks import ChunkBuilder
-from crgame_ros.cockpit.replay_index import index_run, RunIndex
-from crgame_ros.cockpit.replay_outline import pack
+from crgame_ros.cockpit.replay_index import index_run, pack, RunIndex
 from crgame_ros.cockpit.replay_tracks import Mark
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.shown_paths import without_paths

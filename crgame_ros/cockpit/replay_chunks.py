@@ -6,10 +6,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
-from crgame_ros.cockpit.message_frames import Frame, MessageFrames
-from crgame_ros.cockpit.perception_frames import Place
-from crgame_ros.cockpit.replay_index import OCCUPANCY_TOPIC, perception_topics, RunIndex
-from crgame_ros.cockpit.replay_outline import pack
+from crgame_ros.cockpit.message_frames import Frame, MessageFrames, Place
+from crgame_ros.cockpit.replay_index import OCCUPANCY_TOPIC, pack, perception_topics, RunIndex
 from crgame_ros.errors import InputError
 from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC

@@ -1,8 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The rights of a person at a page: direct the experiment, drive, or watch."""
+"""The rights of a person at a page: direct, drive or watch; and links that grant them."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+import hashlib
+import json
+import os
+from pathlib import Path
+import secrets
+
+from crgame_ros.errors import CrgameError, InputError
 
 # The roles that a page, a link or the address may request.
 ROLES = ('direct', 'drive', 'watch', 'all')
@@ -13,6 +21,10 @@ _DEEDS = {'start': 'start the run', 'pause': 'pause the run', 'step': 'step thro
           'reset': 'reset the run', 'stop': 'stop the run', 'rate': 'change the speed of time',
           'planner': 'stop a planner or let it go on', 'trigger': 'trigger events',
           'load': 'choose what is run', 'invite': 'make links', 'delete': 'delete runs'}
+TOKEN_BYTES = 24
+MAX_LINKS = 200
+USED = 'This link has been used: it lets one browser in. Ask whoever gave it to you for another.'
+UNKNOWN = 'Open a link that was printed at the start, or that somebody gave you.'
 
 
 @dataclass(frozen=True)
@@ -68,3 +80,94 @@ class Rights:
 
 
 ALL_RIGHTS = Rights()
+
+
+@dataclass
+class _Link:
+    """A link: the digests of its token and of the cookie that replaced the token."""
+
+    token: str
+    role: str
+    seat: str
+    cookie: str = ''
+
+
+class Invitations:
+    """
+    The links of one cockpit. Only digests are kept, in memory and in the file.
+
+    :param path: file that a restarted cockpit reads; created readable for its owner only.
+    :raises InputError: if the file is not a list of links.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._links: list[_Link] = []
+        self.is_new = not path.exists()
+        if not self.is_new:
+            try:
+                self._links = [_Link(**entry) for entry in json.loads(path.read_text('utf-8'))]
+            except (OSError, ValueError, TypeError) as error:
+                raise InputError('is no list of links', str(path), 'remove it') from error
+
+    def make(self, role: str, seat: str = '') -> str:
+        """
+        Create a link.
+
+        :param role: direct, drive, watch or all.
+        :param seat: the only seat that its driver may take; empty for any.
+        :return: its token.
+        :raises CrgameError: if there are too many, or they cannot be saved.
+        """
+        if len(self._links) >= MAX_LINKS:
+            raise CrgameError(f'{MAX_LINKS} links have been made: start the cockpit again')
+        token = secrets.token_urlsafe(TOKEN_BYTES)
+        self._links.append(_Link(_digest(token), role, seat))
+        self._write()
+        return token
+
+    def exchange(self, token: str, cookie: str | None) -> str:
+        """
+        Exchange a token for a cookie.
+
+        :param cookie: the browser's cookie, if any: a browser may open its own link again.
+        :return: the cookie.
+        :raises InputError: with a readable sentence, if there is no such link or it was used.
+        """
+        link = _find(self._links, 'token', token)
+        if link is None:
+            raise InputError(UNKNOWN)
+        if link.cookie:
+            if cookie is None or not secrets.compare_digest(link.cookie, _digest(cookie)):
+                raise InputError(USED)
+            return cookie
+        cookie = secrets.token_urlsafe(TOKEN_BYTES)
+        link.cookie = _digest(cookie)
+        self._write()
+        return cookie
+
+    def rights(self, cookie: str | None) -> Rights | None:
+        """Return the rights of the browser with a cookie; None if it used no link."""
+        link = _find(self._links, 'cookie', cookie) if cookie else None
+        return None if link is None else Rights.for_role(link.role, link.seat)
+
+    def _write(self) -> None:
+        part = self._path.with_suffix('.new')
+        try:
+            part.unlink(missing_ok=True)
+            file = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with os.fdopen(file, 'w', encoding='utf-8') as stream:
+                json.dump([asdict(link) for link in self._links], stream)
+            part.replace(self._path)
+        except OSError as error:
+            raise CrgameError(f'{self._path}: cannot be written ({error.strerror})') from error
+
+
+def _digest(secret: str) -> str:
+    return hashlib.sha256(secret.encode('utf-8', 'surrogatepass')).hexdigest()
+
+
+def _find(links: Sequence[_Link], field: str, secret: str) -> _Link | None:
+    # Digests are compared, so the time that it takes reveals nothing of the secret.
+    digest = _digest(secret)
+    return next((link for link in links if getattr(link, field) == digest), None)

@@ -1,19 +1,111 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The seats that clients of this server hold, and the seats document of the page."""
+"""The seats that clients of this server hold, their orders and inputs, and the document of it."""
 
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
 import math
 from pathlib import PurePath
 
-from crgame_ros.cockpit.held_seat import HeldSeat
+from crgame_ros.cockpit.page_messages import Input
+from crgame_ros.driver.input_delay import InputDelay
+from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
+from crgame_ros.driver.seat_state import after, home_of
 from crgame_ros.driver.source import COCKPIT
+from crgame_ros.driver.wheel import IndicatorLever, LightButtons
 from crgame_ros.errors import InputError
-from crgame_ros.game.seat_documents import SeatEntry, SeatOccupant
+from crgame_ros.game.seat_documents import SeatDemand, SeatEntry, SeatOccupant
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 
 # How long a seat is kept for a driver whose connection has broken [s].
 KEEP_S = 60.0
+# A page repeats its input every 50 ms; after this silence it counts as gone [s].
+SILENCE_S = 0.2
+# The lever and the horn as the page reports them: which of left, right, hazard, horn are held.
+_LIGHTS = LightButtons(*(frozenset({i}) for i in range(4)))
+# Interval of repetition [s]: an order sent while the simulation loads another game is lost.
+AGAIN_S = 0.5
+GIVE_UP_S = 10.0
+
+Seats = Mapping[str, SeatEntry]
+
+
+class HeldSeat:
+    """
+    A seat that a driver in the browser holds.
+
+    Keys pass the keyboard filter (CRG 18-19) in simulation time. Axes are used as the page
+    calibrated them (CRG 17).
+
+    :param seat_id: the vehicle.
+    :param holder: id of the client.
+    :param person: id of the client's person.
+    """
+
+    def __init__(self, seat_id: str, holder: str, person: str = '') -> None:
+        self.id = seat_id
+        self.holder = holder
+        self.person = person
+        self.requests: list[str] = []
+        # The client to which the holder offers the seat, until it has answered.
+        self.offered_to: str | None = None
+        self.delay = InputDelay()
+        self._cycles = KeyboardCycles()
+        self._lever = IndicatorLever(_LIGHTS)
+        self._keys: KeyState | None = None
+        self._axes: DriverCommand | None = None
+        self._put_back = False
+        self._heard_s = 0.0
+        self.away = True
+
+    def apply_input(self, message: Input, now_s: float) -> bool:
+        """
+        Apply an input of the holder.
+
+        :param now_s: steady clock [s]
+        :return: whether the inputs differ from the ones before.
+        """
+        self._heard_s = now_s
+        before = (self._keys, self._axes)
+        self._put_back = message.put_back
+        self.away = bool(message.away)
+        self._lever.hold(i for i, held in enumerate(message.lights or ()) if held)
+        if message.axes is not None:
+            self._keys, self._axes = None, DriverCommand(*message.axes, message.reverse)
+        elif message.keys is not None:
+            self._keys, self._axes = KeyState(*message.keys, message.reverse), None
+        else:
+            self.release()
+        return (self._keys, self._axes) != before
+
+    def release(self) -> None:
+        """Release all controls at once."""
+        self.away = True
+        self._keys = self._axes = None
+        self._put_back = False
+        self._cycles.reset()
+        self._lever.hold(())
+
+    def is_silent(self, now_s: float) -> bool:
+        """Return whether the page has been silent for too long."""
+        return not self.away and now_s - self._heard_s > SILENCE_S
+
+    def command(self, n: int, dt_s: float) -> DriverCommand:
+        """
+        Return the command of cycle n; an empty seat releases all but the indicators.
+
+        :param dt_s: length of a cycle in simulation time [s]
+        """
+        command = RELEASED
+        if self._axes is not None:
+            command = self._axes
+        elif self._keys is not None:
+            if n < self._cycles.cycle:
+                # A new run has begun.
+                self._cycles.reset()
+            command = self._cycles.command(n, self._keys, dt_s)
+        self._lever.turn(command.steering)
+        return command._replace(lights=self._lever.lights, put_back=self._put_back)
 
 
 def _people(clients: Iterable[str], names: Mapping[str, str]) -> list[dict[str, str]]:
@@ -267,3 +359,85 @@ class SeatTable:
         if holder is None or holder.holder != client:
             raise InputError('you do not have the seat', seat, 'claim it first')
         return holder
+
+
+@dataclass
+class _Order:
+    demand: SeatDemand
+    ordered_s: float
+    sent_s: float
+
+
+class SeatOrders:
+    """
+    The seat orders that are not fulfilled yet, to be repeated until they are.
+
+    Until then, `/seats` may still report the earlier state, which does not refute the order.
+    """
+
+    def __init__(self) -> None:
+        self._orders: dict[str, _Order] = {}
+
+    def __contains__(self, seat: object) -> bool:
+        """Return whether an order about a seat is pending."""
+        return seat in self._orders
+
+    def note(self, demand: SeatDemand, seats: Seats, now_s: float) -> None:
+        """
+        Record an order that is sent now: a person takes a seat or gives it back.
+
+        :param seats: content of `/seats`; an order that is already fulfilled needs no answer.
+        :param now_s: steady clock [s].
+        """
+        seat = demand.seat
+        if seat in self._orders or not _is_so(demand, seats.get(seat)):
+            self._orders[seat] = _Order(demand, now_s, now_s)
+
+    def answered(self, seats: Seats) -> None:
+        """Remove the orders that the new content of `/seats` fulfils or makes void."""
+        self._orders = {
+            seat: order for seat, order in self._orders.items()
+            if seat in seats and not _is_so(order.demand, seats[seat])
+            and not _is_in_vain(order.demand, seats[seat])}
+
+    def due(self, now_s: float) -> list[SeatDemand]:
+        """
+        Return the orders to send again, and forget those without an answer.
+
+        :param now_s: steady clock [s].
+        """
+        self._orders = {seat: order for seat, order in self._orders.items()
+                        if now_s - order.ordered_s < GIVE_UP_S}
+        due = []
+        for order in self._orders.values():
+            if now_s - order.sent_s >= AGAIN_S:
+                order.sent_s = now_s
+                due.append(order.demand)
+        return due
+
+
+def _is_so(demand: SeatDemand, entry: SeatEntry | None) -> bool:
+    """Return whether an order is fulfilled."""
+    if entry is None:
+        return False
+    then = _after(demand, entry)
+    return then is not None and _driver(then) == _driver(entry)
+
+
+def _is_in_vain(demand: SeatDemand, entry: SeatEntry) -> bool:
+    """Return whether an order is refused, because a person at another cockpit was first."""
+    return _after(demand, entry) is None
+
+
+def _after(demand: SeatDemand, entry: SeatEntry) -> SeatEntry | None:
+    try:
+        # Whether an AV is its planner's or the game's makes no difference here.
+        return after(entry, demand, home_of(entry.driver))
+    except InputError:
+        return None
+
+
+def _driver(entry: SeatEntry) -> tuple[bool, bool, str | None]:
+    """Return what an order about a seat decides: people may change their names meanwhile."""
+    return (entry.source == COCKPIT, entry.here,
+            None if entry.person is None else entry.person.id)

@@ -13,13 +13,17 @@ import math
 from typing import NamedTuple
 
 from commonroad.scenario.lanelet import LaneletNetwork
-from crgame_ros.drivability.collision import CollisionDetector
-from crgame_ros.drivability.permanent_obstacles import PERMANENT_OBSTACLE, PermanentObstacles
+from crgame_ros.drivability.collision import (
+    CollisionDetector,
+    PERMANENT_OBSTACLE,
+    PermanentObstacles,
+)
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import DrivabilitySpec
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
+from crgame_ros.messages.status_values import ERROR, OK, Status
 from crgame_ros.occupancy.occupancy import OccupancyMap
 from crgame_ros.roads.boundary import RoadBoundary
 from crgame_ros.vehicle.state import STATE_WIDTH
@@ -241,3 +245,18 @@ def changes(previous: Sequence[VehicleDrivability], current: Sequence[VehicleDri
 def _says_more(known: VehicleDrivability | None, verdict: VehicleDrivability) -> bool:
     return known is None or known.collision != verdict.collision \
         or known.off_road != verdict.off_road or known.hit != verdict.hit
+
+
+def drivability_status(verdict: VehicleDrivability, spec: DrivabilitySpec) -> Status:
+    """
+    Return the status of a verdict.
+
+    :param spec: of the game: which checks run.
+    """
+    faults = verdict.faults
+    return Status.of(
+        f'{verdict.vehicle_id}/drivability', ERROR if faults else OK,
+        '; '.join(faults) or 'valid',
+        {'collision': verdict.collision if spec.collision else 'off',
+         'road_compliance': not verdict.off_road if spec.road else 'off',
+         'hit': ','.join(verdict.hit), 'n': verdict.n, 'stop': verdict.stop_requested})

@@ -9,9 +9,8 @@ from pathlib import Path
 import re
 from typing import Annotated, Any, ClassVar, Literal
 
-from crgame_ros.driver.indicator_lever import LightButtons
 from crgame_ros.driver.keyboard import KeyState
-from crgame_ros.driver.wheel import AxisBinding, ControlBindings, GearButtons
+from crgame_ros.driver.wheel import AxisBinding, ControlBindings, GearButtons, LightButtons
 from crgame_ros.errors import InputError
 from crgame_ros.paths import config_directory
 from crgame_ros.schema.declaration import Form

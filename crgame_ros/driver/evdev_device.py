@@ -13,13 +13,15 @@ import time
 from typing import Any
 
 from crgame_ros.driver.device_map import DeviceMap, ForceLimits, load_device_map, load_device_maps
-from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons, NO_LIGHTS
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import (
     ControlLayout,
     GearButtons,
+    IndicatorLever,
     joy_state,
     JoyState,
+    LightButtons,
+    NO_LIGHTS,
     RawInput,
     reported,
 )

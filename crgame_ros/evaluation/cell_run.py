@@ -10,7 +10,7 @@ import time
 from typing import Any
 
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.each_minute import kind_of
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_scene import INPUTS

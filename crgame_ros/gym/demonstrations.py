@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.gym.agent_game import AgentGame, make_experiment

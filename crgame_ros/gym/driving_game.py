@@ -5,9 +5,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from crgame_ros.drivability.collision import CIRCLE_SLACK
+from crgame_ros.drivability.collision import CIRCLE_SLACK, PERMANENT_OBSTACLE, PermanentObstacles
 from crgame_ros.drivability.monitor import road_transforms
-from crgame_ros.drivability.permanent_obstacles import PERMANENT_OBSTACLE, PermanentObstacles
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
 from crgame_ros.game.driven_vehicle import DrivenHuman
@@ -17,7 +16,7 @@ from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.gym.av_pilot import AvPilot, stacked
 from crgame_ros.gym.episode_options import Start
 from crgame_ros.gym.episode_setups import EpisodeSetups
-from crgame_ros.planner.road_limit import TOLERANCE
+from crgame_ros.planner.plan_check import TOLERANCE
 from crgame_ros.policy.actions import (
     ActionKind,
     checked_action,

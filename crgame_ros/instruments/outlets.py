@@ -1,18 +1,151 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The streams of a run for other programs, as LSL outlets."""
+"""
+The streams of a run for other programs, as LSL outlets, kept on this machine.
 
-from collections.abc import Sequence
+liblsl's own setting of the scope restricts how streams are sought, over IPv4 and IPv6. But its
+servers listen on every interface, whatever is set: another machine that knows a port could read.
+So their sockets are bound to the loopback device, which the kernel (5.7 or newer) grants to
+everybody. What seeks streams still takes answers from everywhere, as liblsl opens its sockets
+again and again; but its questions do not leave the machine.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import os
+from pathlib import Path
 import platform
-from typing import Any
+import socket
+from typing import Any, TypeVar
 
+from crgame_ros.errors import CrgameError
 from crgame_ros.game.instruments_spec import InstrumentsSpec
-from crgame_ros.instruments.loopback import CONFIGURATION, on_loopback
-from crgame_ros.instruments.stream_description import StreamDescription
+from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
+from crgame_ros.vehicle.state import StateColumn
 from crgame_ros.version import __version__
 
 # Begins the ids of streams of this package.
 OWN = 'crgame_ros/'
+T = TypeVar('T')
+# What matters is told by this package, in one line each; liblsl would tell of every connection.
+CONFIGURATION = """
+[ports]
+IPv6 = disable
+[multicast]
+ResolveScope = machine
+ListenAddress = 127.0.0.1
+Interfaces = {127.0.0.1}
+[log]
+level = -3
+"""
+_DEVICE = b'lo'
+# Each stream is a server with threads of its own, and liblsl has 32 ports for them.
+MAX_VEHICLES = 12
+
+
+class OpenSocketError(CrgameError):
+    """The failure to keep a socket on this machine."""
+
+
+def on_loopback(make: Callable[[], T]) -> T:
+    """
+    Make something that opens sockets, and bind these to the loopback device.
+
+    :raises OpenSocketError: if the kernel refuses.
+    """
+    before = _sockets()
+    made = make()
+    for number in _sockets() - before:
+        _restrict(number)
+    return made
+
+
+def _sockets() -> set[int]:
+    """Return the numbers of this process's open sockets."""
+    found = set()
+    for entry in Path('/proc/self/fd').iterdir():
+        try:
+            if os.readlink(entry).startswith('socket:'):
+                found.add(int(entry.name))
+        except OSError:
+            # Closed since.
+            continue
+    return found
+
+
+def _restrict(number: int) -> None:
+    try:
+        copy = socket.socket(fileno=os.dup(number))
+    except OSError:
+        # Closed since.
+        return
+    with copy:
+        if copy.family not in (socket.AF_INET, socket.AF_INET6):
+            return
+        try:
+            copy.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, _DEVICE)
+        except OSError as error:
+            raise OpenSocketError(
+                f'instruments: LSL cannot be kept on this machine ({error.strerror}); use Linux '
+                '5.7 or newer, or give "scope: network"') from error
+
+
+@dataclass(frozen=True)
+class Channel:
+    """
+    A channel of a stream.
+
+    :param name: of it.
+    :param unit: of its values, SI; `normalized` for a bare number.
+    :param what: kind of quantity.
+    """
+
+    name: str
+    unit: str
+    what: str
+
+
+@dataclass(frozen=True)
+class StreamDescription:
+    """
+    A stream.
+
+    :param name: of it.
+    :param type: kind of its content.
+    :param channels: of it.
+    :param rate_hz: nominal; 0 if it is irregular [Hz]
+    :param texts: whether its values are texts.
+    """
+
+    name: str
+    type: str  # noqa: A003
+    channels: tuple[Channel, ...]
+    rate_hz: float = 0.0
+    texts: bool = False
+
+
+MARKERS = StreamDescription('crgame_ros markers', 'Markers', (Channel('marker', '', 'Marker'),),
+                            texts=True)
+_STATE = {
+    StateColumn.X: Channel('x', 'm', 'PositionX'), StateColumn.Y: Channel('y', 'm', 'PositionY'),
+    StateColumn.YAW: Channel('yaw', 'rad', 'OrientationYaw'),
+    StateColumn.SPEED: Channel('speed', 'm/s', 'Velocity'),
+    StateColumn.STEERING_ANGLE: Channel('steering_angle', 'rad', 'Angle'),
+    StateColumn.ACCELERATION: Channel('acceleration', 'm/s^2', 'Acceleration'),
+    StateColumn.YAW_RATE: Channel('yaw_rate', 'rad/s', 'AngularVelocity'),
+    StateColumn.STEERING_RATE: Channel('steering_rate', 'rad/s', 'AngularVelocity')}
+
+
+def vehicle_stream(vehicle_id: str, rate_hz: float) -> StreamDescription:
+    """Return the stream of a vehicle's state: the rear axle in the frame map."""
+    return StreamDescription(f'crgame_ros vehicle {vehicle_id}', 'Vehicle',
+                             tuple(_STATE[column] for column in StateColumn), rate_hz)
+
+
+def driver_stream(vehicle_id: str, rate_hz: float) -> StreamDescription:
+    """Return the stream of a driver's consumed commands, NaN while an AV follows its plan."""
+    return StreamDescription(f'crgame_ros driver {vehicle_id}', 'Driver', tuple(
+        Channel(name, 'normalized', 'Control') for name in COMMAND_COLUMNS), rate_hz)
 
 
 def configure(spec: InstrumentsSpec) -> None:

@@ -13,7 +13,7 @@ from crgame_ros.cockpit.framing_origin import read_origin
 from crgame_ros.errors import InputError
 from crgame_ros.library.lookup import find_scenario, scenario_of
 from crgame_ros.paths import find_game
-from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
+from crgame_ros.timing.time_controller import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 
 DESCRIPTION = """\
 Drive in a CommonRoad scenario against autonomous vehicles, and record it.

@@ -16,9 +16,8 @@ from types import FrameType
 from crgame_ros.errors import CrgameError
 from crgame_ros.launcher.arguments import parse_arguments
 from crgame_ros.launcher.finisher import Finisher
-from crgame_ros.launcher.forked_node import load
 from crgame_ros.launcher.interruption import ENDING, print_now, writing
-from crgame_ros.launcher.node_process import NodeProcess, NodeSpec
+from crgame_ros.launcher.node_process import load, NodeProcess, NodeSpec
 from crgame_ros.launcher.node_specs import node_specs, Roster, shared_modules
 from crgame_ros.launcher.run_plan import plan_run, RunPlan
 from crgame_ros.ros.environment import (

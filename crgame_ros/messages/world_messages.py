@@ -5,8 +5,8 @@
 from collections.abc import Iterable
 
 from crgame_ros.game.objects import ObjectDescription, ObjectStates
-from crgame_ros.messages.joint_messages import JointReader
 from crgame_ros.messages.joints import (
+    JointReader,
     object_joint_names,
     OBJECT_JOINTS,
     vehicle_joint_names,

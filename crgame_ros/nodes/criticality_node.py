@@ -15,7 +15,7 @@ from crgame_ros.analysis.criticality.rows import (
 from crgame_ros.analysis.criticality.thresholds import OPTIONS, Thresholds, USUAL
 from crgame_ros.ros.node_main import run_node
 from crgame_ros.ros.number_parameters import declare_number
-from crgame_ros.ros.observer_node import ObserverNode
+from crgame_ros.ros.world_follower import ObserverNode
 from crgame_ros.simulation.observer import ObservedRun
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension

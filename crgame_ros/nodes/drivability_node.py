@@ -5,11 +5,14 @@
 from collections.abc import Sequence
 import time
 
-from crgame_ros.drivability.monitor import DrivabilityMonitor, VehicleDrivability
-from crgame_ros.drivability.status import drivability_status
+from crgame_ros.drivability.monitor import (
+    drivability_status,
+    DrivabilityMonitor,
+    VehicleDrivability,
+)
 from crgame_ros.game.game import DrivabilitySpec
 from crgame_ros.ros.node_main import run_node
-from crgame_ros.ros.observer_node import ObserverNode
+from crgame_ros.ros.world_follower import ObserverNode
 from crgame_ros.simulation.observer import drivability_monitor, ObservedRun
 from rclpy.publisher import Publisher
 

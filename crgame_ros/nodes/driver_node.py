@@ -20,11 +20,9 @@ from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import GAME, GameDocument
 from crgame_ros.game.seat_documents import SEATS
 from crgame_ros.registry import POLICY
-from crgame_ros.ros.complaints import complain
-from crgame_ros.ros.device_delay import DeviceDelay
+from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.live_driver import live_driver
-from crgame_ros.ros.live_force import LiveForce
+from crgame_ros.ros.live_driver import DeviceDelay, live_driver, LiveForce
 from crgame_ros.ros.messages import from_time, to_joy, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.spinning import PromptNode, spin_promptly

@@ -16,14 +16,15 @@ from crgame_ros.game.task_documents import TASK_LOG
 from crgame_ros.instruments.extra import require_instruments
 from crgame_ros.instruments.inlets import Inlets
 from crgame_ros.instruments.markers import Marker, RunMarkers
-from crgame_ros.instruments.outlets import configure, Outlet
-from crgame_ros.instruments.run_clock import CycleStarts
-from crgame_ros.instruments.stream_description import (
+from crgame_ros.instruments.outlets import (
+    configure,
     driver_stream,
     MARKERS,
     MAX_VEHICLES,
+    Outlet,
     vehicle_stream,
 )
+from crgame_ros.instruments.run_clock import CycleStarts
 from crgame_ros.instruments.triggers import TriggerSender
 from crgame_ros.messages.instrument_samples import (
     InstrumentStream,
@@ -38,7 +39,7 @@ from crgame_ros.messages.instrument_samples import (
 )
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.messages.world_messages import VEHICLES_TOPIC, WorldMessages
-from crgame_ros.ros.complaints import complain
+from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
 from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.node_main import run_node, StopFlag

@@ -6,7 +6,7 @@ from array import array
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.documents import GAME
-from crgame_ros.messages.joint_messages import MAP
+from crgame_ros.messages.joints import MAP
 from crgame_ros.occupancy.occupancy import OccupancyGrid
 from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.ros.endpoints import Endpoints

@@ -9,15 +9,12 @@ import time
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import EVENTS, FiredEvents, GameDocument
 from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.messages.joint_messages import from_joint_trajectory, MAP
-from crgame_ros.messages.joints import plan_to_joints
+from crgame_ros.messages.joints import from_joint_trajectory, MAP, plan_to_joints
 from crgame_ros.messages.plan import Plan
-from crgame_ros.planner.failure_lines import FailureLines
 from crgame_ros.planner.interface import PlannerContext
-from crgame_ros.planner.manager import PlannerManager, swapped_in
+from crgame_ros.planner.manager import FailureLines, planner_status, PlannerManager, swapped_in
 from crgame_ros.planner.request_reader import RequestReader
-from crgame_ros.planner.status import planner_status
-from crgame_ros.ros.complaints import complain
+from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import SeriesMessage, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag

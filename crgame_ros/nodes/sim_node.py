@@ -10,24 +10,24 @@ import time
 from typing import TYPE_CHECKING
 
 from crgame_ros.driver.source import COCKPIT, is_replay
-from crgame_ros.errors import CrgameError
+from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.game import Game
 from crgame_ros.nodes.sim.control import SimControl
 from crgame_ros.nodes.sim.live_run import LiveRun
 from crgame_ros.nodes.sim.run_state import Outcome
 from crgame_ros.nodes.sim.simulation_interfaces import offer_simulation_interfaces
 from crgame_ros.recording.run_folder import run_folder
+from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.namespace_lock import hold_namespace
 from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.other_simulation import refuse_another
 from crgame_ros.ros.run_profile import open_topics
 from crgame_ros.simulation.roster import Participants
 from crgame_ros.simulation.setup import build_setup, Setup
-from crgame_ros.timing.time_slice import lock_memory, shorten_time_slice
+from crgame_ros.timing.thread_counters import lock_memory, shorten_time_slice
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-if TYPE_CHECKING:  # Recordings are read in few runs, by code that takes time to load.
+if TYPE_CHECKING:
     from crgame_ros.recording.recorded_inputs import RecordedInputs
 
 NS_PER_S = 1_000_000_000
@@ -36,6 +36,8 @@ FIRST_OFFSET_NS = NS_PER_S
 REALTIME_PRIORITY = 50
 # Nodes discover each other within this time [s].
 DISCOVERY_S = 2.0
+# Time to wait for a simulation's state, which is published every second [s].
+ALIVE_S = 6.0
 
 
 class SimNode(Node):
@@ -182,3 +184,35 @@ def main(args: list[str] | None = None) -> None:
 
 if __name__ == '__main__':
     main()
+
+
+def refuse_another(node: Node, until_s: float) -> None:
+    """
+    Check that no other simulation publishes here: two on the same topics would mix.
+
+    On this machine a lock ensures that (`namespace_lock`); this check covers other machines and
+    users.
+
+    :param node: in the namespace in question.
+    :param until_s: until when others may be discovered, on the steady clock.
+    :raises InputError: if another one publishes.
+    """
+    endpoints = Endpoints(node)
+    while time.monotonic() < until_s and not node.count_publishers('clock'):
+        time.sleep(0.02)
+    if not node.count_publishers('clock'):
+        return
+    # A process killed a moment ago is still listed; a live one publishes every second.
+    heard = endpoints.polled('/diagnostics')
+    until_s = time.monotonic() + ALIVE_S
+    while time.monotonic() < until_s:
+        message = heard.pop()
+        statuses = [] if message is None else message.status
+        if any(item.name == 'sim_node: run' for item in statuses):
+            raise InputError(
+                f'another simulation runs in namespace {node.get_namespace()} of this ROS domain',
+                'sim_node', 'end it, or start this one in a namespace (--namespace, '
+                '-r __ns:=/exp2) or with another ROS_DOMAIN_ID')
+        if message is None:
+            time.sleep(0.01)
+    endpoints.release(heard)

@@ -7,15 +7,15 @@ import time
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import GAME, GameDocument
 from crgame_ros.game.game import TimingSpec
-from crgame_ros.ros.complaints import complain
+from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.run_time import GameAwaited, RunTime, TimeCourse
 from crgame_ros.ros.spinning import poll
 from crgame_ros.timing.cycle_rows import CycleTable
-from crgame_ros.timing.frame_skipping import FrameSkipping
 from crgame_ros.timing.late_steps import LateSteps
 from crgame_ros.timing.metrics import slowness, TimingMetrics
+from crgame_ros.timing.publishing import FrameSkipping
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from std_msgs.msg import Bool

@@ -14,10 +14,9 @@ from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joints import JointSeries, vehicle_to_joints, without_absent
 from crgame_ros.messages.request_layout import RequestLayout, with_lights, without_lights
 from crgame_ros.occupancy.occupancy import OccupancyGrid, OccupancyMap
-from crgame_ros.perception.bodies import SensedBodies
 from crgame_ros.perception.localisation import Localisation
 from crgame_ros.perception.noise import in_map
-from crgame_ros.perception.sensors import Detections, MountedSensor, Scan
+from crgame_ros.perception.sensors import Detections, MountedSensor, Scan, SensedBodies
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import pose_rates, VehicleState
 import numpy as np

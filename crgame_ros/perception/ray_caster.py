@@ -6,8 +6,16 @@ import math
 
 from crgame_ros.game.perception_spec import SensorSpec
 from crgame_ros.occupancy.occupancy import OccupancyGrid
-from crgame_ros.perception.bodies import Discs, Edges, SensedBodies
-from crgame_ros.perception.sensors import NOTHING, PERMANENT, Pose, Scan, Sensor
+from crgame_ros.perception.sensors import (
+    Discs,
+    Edges,
+    NOTHING,
+    PERMANENT,
+    Pose,
+    Scan,
+    SensedBodies,
+    Sensor,
+)
 import numpy as np
 from numpy.typing import NDArray
 

@@ -12,9 +12,8 @@ from crgame_ros.errors import CrgameError, PlanningError
 from crgame_ros.geometry.curve import arc_length
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.interface import Planner, PlannerContext
-from crgame_ros.planner.plan_check import check_start
-from crgame_ros.planner.road_limit import RoadLimit
-from crgame_ros.planner.rollout import braking_plan
+from crgame_ros.planner.path_following import braking_plan
+from crgame_ros.planner.plan_check import check_start, RoadLimit
 from crgame_ros.vehicle.state import StateColumn, VehicleState
 from crgame_ros.vehicle.stopping import firm_braking
 import numpy as np

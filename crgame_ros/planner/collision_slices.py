@@ -11,7 +11,7 @@ from crgame_ros.geometry.shape import Shape
 from crgame_ros.messages.plan import PlanRequest
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.path_obstacles import prolong
-from crgame_ros.planner.road_limit import RoadLimit
+from crgame_ros.planner.plan_check import RoadLimit
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from numpy.typing import NDArray

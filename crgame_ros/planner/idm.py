@@ -13,10 +13,13 @@ from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.path_following import Longitudinal, PathPosition
 from crgame_ros.planner.path_obstacles import Corridor, ObstacleProjector, PathObstacles
 from crgame_ros.planner.path_planner import check_positive, PathPlanner
-from crgame_ros.planner.reference_path import DrivingPath
-from crgame_ros.planner.route_lane_change import has_gap, LaneChange, Verdict
-from crgame_ros.planner.side_lanes import OWN_LANE, SideLane
-from crgame_ros.planner.speed_profile import admissible_speeds, default_speed, desired_speeds
+from crgame_ros.planner.reference_path import (
+    admissible_speeds,
+    default_speed,
+    desired_speeds,
+    DrivingPath,
+)
+from crgame_ros.planner.side_lanes import has_gap, LaneChange, OWN_LANE, SideLane, Verdict
 from crgame_ros.roads.signals import RED_STATES, TrafficLights
 from crgame_ros.roads.signs import (
     has_stop_sign,

@@ -52,11 +52,11 @@ from crgame_ros.messages.plan import Plan, PlanRequest  # noqa: E402
 from crgame_ros.planner.path_following import PathPosition  # noqa: E402
 from crgame_ros.planner.path_obstacles import Corridor, ObstacleProjector, prolong  # noqa: E402
 from crgame_ros.planner.path_planner import check_positive, PathPlanner  # noqa: E402
-from crgame_ros.planner.reference_path import DrivingPath  # noqa: E402
-from crgame_ros.planner.speed_profile import (  # noqa: E402
+from crgame_ros.planner.reference_path import (  # noqa: E402
     admissible_speeds,
     default_speed,
     desired_speeds,
+    DrivingPath,  # noqa: E402
 )
 from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
 from crgame_ros.vehicle.state import STANDING  # noqa: E402

@@ -8,14 +8,14 @@ from typing import ClassVar, NamedTuple
 
 from crgame_ros.errors import PlanningError
 from crgame_ros.messages.plan import Plan, PlanRequest
-from crgame_ros.planner.clearance import Clearance
 from crgame_ros.planner.idm import IdmPlanner
 from crgame_ros.planner.interface import Planner, PlannerContext
 from crgame_ros.planner.path_following import PathPosition
+from crgame_ros.planner.path_obstacles import Clearance
 from crgame_ros.planner.path_planner import check_positive
+from crgame_ros.planner.plan_check import TOLERANCE
 from crgame_ros.planner.reactive_core import configuration, ReactiveCore
 from crgame_ros.planner.reference_path import DrivingPath
-from crgame_ros.planner.road_limit import TOLERANCE
 from crgame_ros.planner.side_lanes import OWN_LANE, road_bounds, side_lanes, SideLane
 from crgame_ros.vehicle.state import REST
 import numpy as np

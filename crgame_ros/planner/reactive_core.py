@@ -22,10 +22,10 @@ from crgame_ros.geometry.angles import wrap_pi  # noqa: E402
 from crgame_ros.geometry.polyline import ReferencePath  # noqa: E402
 from crgame_ros.geometry.reference_point import joined, shifted  # noqa: E402
 from crgame_ros.messages.plan import PlanRequest  # noqa: E402
-from crgame_ros.planner.clearance import Clearance  # noqa: E402
 from crgame_ros.planner.collision_slices import CollisionSlices  # noqa: E402
 from crgame_ros.planner.interface import PlannerContext  # noqa: E402
 from crgame_ros.planner.path_following import PathPosition  # noqa: E402
+from crgame_ros.planner.path_obstacles import Clearance  # noqa: E402
 from crgame_ros.planner.reference_path import DrivingPath  # noqa: E402
 from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
 from crgame_ros.vehicle.state import REST, STATE_WIDTH  # noqa: E402

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The drivable path of a planning problem: routed, smoothed, extended beyond the goal."""
+"""The drivable path of a planning problem: routed, smoothed, extended; and its speeds."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,6 +14,7 @@ from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets, in_lane, Route, start_lanelet
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.stopping import SpeedEnvelope
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,6 +27,9 @@ CHANGE_TIME = 4.0
 CHANGE_MIN = 25.0
 # At this distance from its lane's centre line a path has begun to change lanes [m].
 BEGUN = 0.2
+# Least desired speed on a road without signs: 30 km/h [m/s].
+SLOWEST_DESIRED = 30.0 / 3.6
+STEERING_RATE_SHARE = 0.6
 
 
 @dataclass(frozen=True)
@@ -213,3 +217,69 @@ def _crossing(roads: RoadNetwork, path: ReferencePath, pair: tuple[int, int],
     aside = [np.abs(roads.line(lanelet).project(points)[1]) for lanelet in pair]
     over = np.flatnonzero(aside[1] < aside[0])
     return float(s[over[0]] if len(over) else s[-1])
+
+
+def default_speed(problem: PlanningProblem) -> float:
+    """
+    Return the desired speed on roads without speed limits.
+
+    It is the initial speed, the middle of the goal's speed interval or 30 km/h, whichever is
+    largest, because a vehicle that starts from rest or in a queue has a low initial speed.
+
+    :return: [m/s]
+    """
+    speeds = [SLOWEST_DESIRED, float(getattr(problem.initial_state, 'velocity', 0.0))]
+    for state in problem.goal.state_list:
+        interval = getattr(state, 'velocity', None)
+        if interval is not None:
+            low = getattr(interval, 'start', interval)
+            speeds.append(0.5 * float(low + getattr(interval, 'end', low)))
+    return max(speeds)
+
+
+def desired_speeds(driving: DrivingPath, wanted: float | None, default: float) -> Array:
+    """
+    Return the desired speed along a path.
+
+    :param wanted: the planner's option v0; None takes the signs, or the default without any [m/s]
+    :param default: `default_speed` [m/s]
+    :return: (N) at the path's samples, never above a speed limit [m/s]
+    """
+    s = driving.path.s
+    speeds = np.full(len(s), np.nan)
+    for lanelet, (first, last) in zip(driving.lanelets, driving.lanelet_spans, strict=True):
+        limit = driving.roads.speed_limit(lanelet)
+        if limit is not None:
+            speeds[(s >= first) & (s <= last)] = limit
+    if wanted is not None:
+        return np.asarray(np.fmin(speeds, wanted))
+    known = np.flatnonzero(~np.isnan(speeds))
+    if not len(known):
+        return np.full(len(s), default)
+    # A lanelet without a sign keeps the limit of the one before it.
+    before = np.searchsorted(known, np.arange(len(s)), side='right') - 1
+    return np.where(before < 0, default, speeds[known[np.maximum(before, 0)]])
+
+
+def admissible_speeds(driving: DrivingPath, desired: Array, vehicle: VehicleParameters,
+                      lateral_acceleration: float, deceleration: float) -> Array:
+    """
+    Return the desired speed, lowered for curves and for lower speeds ahead.
+
+    :param desired: (N) [m/s]
+    :param vehicle: whose largest acceleration, less on a slippery road, limits the next two.
+    :param lateral_acceleration: comfortable in curves [m/s^2]
+    :param deceleration: towards a lower speed ahead [m/s^2]
+    :return: (N) [m/s]
+    """
+    path = driving.path
+    lateral_acceleration = min(lateral_acceleration, vehicle.max_acceleration)
+    deceleration = min(deceleration, vehicle.max_acceleration)
+    curvature = np.maximum(np.abs(path.curvature), 1e-6)
+    slope = np.maximum(np.abs(np.gradient(path.curvature, path.step)), 1e-6)
+    cos = 1.0 / np.hypot(1.0, vehicle.wheelbase * curvature)
+    rate = STEERING_RATE_SHARE * vehicle.max_steering_rate
+    limit = np.minimum(desired, np.sqrt(lateral_acceleration / curvature))
+    limit = np.minimum(limit, rate / (vehicle.wheelbase * slope * cos ** 2))
+    limit = np.clip(limit, 0.5, vehicle.max_speed)
+    return SpeedEnvelope(path.s, limit, deceleration).speeds

@@ -8,7 +8,7 @@ from typing import get_args, Literal, NamedTuple
 
 from crgame_ros.errors import PlanningError
 from crgame_ros.geometry.angles import wrap_pi_array
-from crgame_ros.planner.rollout import Rollout
+from crgame_ros.planner.path_following import Rollout
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
 from crgame_ros.vehicle.parameters import VehicleParameters

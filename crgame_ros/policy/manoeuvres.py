@@ -7,9 +7,13 @@ import math
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.planner.path_following import PathFollower, PathPosition
-from crgame_ros.planner.reference_path import CHANGE_MIN, CHANGE_TIME, plan_driving_path
+from crgame_ros.planner.reference_path import (
+    admissible_speeds,
+    CHANGE_MIN,
+    CHANGE_TIME,
+    plan_driving_path,
+)
 from crgame_ros.planner.side_lanes import side_lanes
-from crgame_ros.planner.speed_profile import admissible_speeds
 from crgame_ros.policy.actions import BRAKING, DRIVING, HELD_S, MANOEUVRES
 from crgame_ros.policy.route_guide import RESERVE
 from crgame_ros.vehicle.parameters import VehicleParameters

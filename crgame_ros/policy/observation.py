@@ -15,8 +15,7 @@ from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import SensorSpec
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.reference_point import ahead, seen_from
-from crgame_ros.perception.bodies import SensedBodies
-from crgame_ros.perception.sensors import create_sensor
+from crgame_ros.perception.sensors import create_sensor, SensedBodies
 from crgame_ros.policy.bird_view import BirdView
 from crgame_ros.policy.observation_spec import (
     Numbers,

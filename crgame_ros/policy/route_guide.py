@@ -9,8 +9,13 @@ from commonroad.geometry.shape import Shape, ShapeGroup
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.geometry.angles import wrap_pi
-from crgame_ros.planner.reference_path import DrivingPath, plan_driving_path
-from crgame_ros.planner.speed_profile import default_speed, desired_speeds, SLOWEST_DESIRED
+from crgame_ros.planner.reference_path import (
+    default_speed,
+    desired_speeds,
+    DrivingPath,
+    plan_driving_path,
+    SLOWEST_DESIRED,
+)
 from crgame_ros.policy.observation_spec import FAR
 from crgame_ros.roads.route import goal_lanelets
 from crgame_ros.scenario.exact_values import group_outline

@@ -6,19 +6,18 @@ from abc import abstractmethod
 from collections.abc import Collection, Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import NoReturn, TYPE_CHECKING, TypeVar
 import warnings
 
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.analysis.runs.run import Run as MeasuredRun
 from crgame_ros.python_interface.games import as_path, FileName
-from crgame_ros.python_interface.named import Named
 from crgame_ros.recording.recorded_inputs import RecordedInputs
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:  # They take a second to import, and only measures need them.
+if TYPE_CHECKING:
     from crgame_ros.analysis.behaviour.driver import DriverBehaviour
     from crgame_ros.analysis.criticality.criticality import VehicleCriticality
     from crgame_ros.analysis.scores.vehicle import VehicleScores
@@ -26,6 +25,7 @@ if TYPE_CHECKING:  # They take a second to import, and only measures need them.
 
 # In messages.
 VEHICLE = 'driven vehicle'
+_Value = TypeVar('_Value')
 
 
 class Run(MeasuredRun):
@@ -167,3 +167,19 @@ def warn_of(notices: Iterable[str]) -> None:
     """Show notices as warnings."""
     for notice in notices:
         warnings.warn(notice, stacklevel=3)
+
+
+class Named(dict[str, _Value]):
+    """
+    A dictionary whose `KeyError` tells the keys.
+
+    :param what: one of its values, as in "no vehicle 'av9'".
+    """
+
+    def __init__(self, what: str, values: Mapping[str, _Value] | Iterable[tuple[str, _Value]] = (),
+                 ) -> None:
+        super().__init__(values)
+        self._what = what
+
+    def __missing__(self, name: object) -> NoReturn:
+        raise KeyError(f'no {self._what} {name!r}; there are: {", ".join(self) or "none"}')

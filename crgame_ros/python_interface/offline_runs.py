@@ -14,8 +14,14 @@ from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup, with_planners
 from crgame_ros.planner.registry import PLANNERS
 from crgame_ros.python_interface.finished_run import Run
-from crgame_ros.python_interface.games import argument_names, as_game, as_path, FileName
-from crgame_ros.python_interface.own_planners import name_planners, PlannerLike
+from crgame_ros.python_interface.games import (
+    argument_names,
+    as_game,
+    as_path,
+    FileName,
+    name_planners,
+    PlannerLike,
+)
 from crgame_ros.recording.conversion import write_openscenario
 from crgame_ros.recording.export import scenario_path, write_scenario
 from crgame_ros.recording.offline_recording import (

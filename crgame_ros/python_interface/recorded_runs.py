@@ -1,15 +1,26 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded runs, with the same interface as offline runs."""
+"""Recorded runs, with the interface of offline runs, and replays with other planners."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+import time
+from typing import Literal, TYPE_CHECKING
 
+from crgame_ros.analysis.counterfactual import Alternative, drive_against
 from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup
-from crgame_ros.python_interface.finished_run import Run
-from crgame_ros.python_interface.games import as_path, FileName
+from crgame_ros.planner.registry import PLANNERS
+from crgame_ros.python_interface.finished_run import Named, Run
+from crgame_ros.python_interface.games import (
+    argument_names,
+    as_path,
+    FileName,
+    name_planners,
+    PlannerLike,
+)
+from crgame_ros.python_interface.offline_runs import OfflineRun
 from crgame_ros.recording.conversion import convert_log, day_of, write_openscenario
 from crgame_ros.recording.recorded_game import read_game_document
 from crgame_ros.recording.recorded_states import recorded_states
@@ -19,6 +30,9 @@ from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajecto
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from crgame_ros.simulation.offline import OfflineResult
 
 
 class RecordedRun(Run):
@@ -79,3 +93,83 @@ def as_run(run: Run | FileName) -> Run:
     :raises InputError: as `read_run`.
     """
     return run if isinstance(run, Run) else read_run(run)
+
+
+class ReplayedRun(OfflineRun):
+    """
+    A run of a recorded human against a planner.
+
+    :ivar alternative: its comparison with the recorded run.
+    """
+
+    def __init__(self, name: str, alternative: Alternative, result: 'OfflineResult',
+                 wall_s: float) -> None:
+        super().__init__(name, result, wall_s)
+        self.alternative = alternative
+
+    @property
+    def human_differs_s(self) -> float | None:
+        """Return when a human first differs from the recorded run [s]; None: never."""
+        return self.alternative.human_differs_s
+
+    @property
+    def others_differ_s(self) -> float | None:
+        """Return when anything but the driven vehicles first differs [s]; None: never."""
+        return self.alternative.others_differ_s
+
+
+class Replays(Named[ReplayedRun]):
+    """
+    Runs by the names of their planners, in the requested order.
+
+    :ivar recorded: the run with the human's recorded drive.
+    """
+
+    def __init__(self, recorded: Run) -> None:
+        super().__init__('planner')
+        self.recorded = recorded
+
+    def _repr_html_(self) -> str:
+        from crgame_ros.python_interface.run_html import replays_html
+        return replays_html(self.recorded.usual_criticality,
+                            [each.alternative for each in self.values()])
+
+
+def replay(run: Run | FileName, planners: PlannerLike | Sequence[PlannerLike], *,
+           latency_steps: int = 0,
+           human: Literal['inputs', 'trajectory'] = 'inputs') -> Replays:
+    """
+    Replay the humans of a run against one planner after the other, as `crgame replay` does.
+
+    :param run: an offline or a recorded run, or the folder of one.
+    :param planners: names, classes or objects; each drives all AVs in a run of its own.
+    :param latency_steps: simulation steps between a request and its plan.
+    :param human: whether the humans' inputs or their trajectories are repeated.
+    :raises InputError: if the run has no human and an AV, or a planner cannot be used.
+    """
+    recorded = as_run(run)
+    if not recorded.game.humans or not recorded.game.avs:
+        raise InputError('has no human and an AV', recorded.name,
+                         'give a run in which both drive')
+    if latency_steps < 0:
+        raise InputError(f'is {latency_steps}', 'latency_steps', 'give 0 or more steps')
+    if human not in ('inputs', 'trajectory'):
+        raise InputError(f'is {human!r}', 'human', 'give "inputs" or "trajectory"')
+    named = name_planners(planners)
+    found = Replays(recorded)
+    with argument_names(), PLANNERS.giving(named.own):
+        # Check every planner before the first one drives.
+        setups = {name: recorded.setup_against(name) for name in named.names}
+        for name in setups:
+            PLANNERS.find(name)
+        for name, setup in setups.items():
+            named.check_object(name, len(setup.avs))
+            began_s = time.perf_counter()
+            alternative = drive_against(
+                name, setup, recorded.log, latency_steps,
+                recorded.recorded_traces() if human == 'trajectory' else None,
+                recorded.recorded_inputs())
+            assert alternative.result is not None
+            found[name] = ReplayedRun(f'{recorded.name} against {name}', alternative,
+                                      alternative.result, time.perf_counter() - began_s)
+    return found

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
-from crgame_ros.instruments.clock_correction import clock_drift, corrected_s
-from crgame_ros.instruments.run_clock import run_times_s
+from crgame_ros.instruments.run_clock import clock_drift, corrected_s, run_times_s
 from crgame_ros.messages.instrument_samples import (
     InstrumentStream,
     read_samples,

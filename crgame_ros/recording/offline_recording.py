@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from crgame_ros.drivability.status import drivability_status
+from crgame_ros.drivability.monitor import drivability_status
 from crgame_ros.driver.seat_state import home_of, PLANNER, REPLAY
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import EVENTS, FiredEvents, RUN_STATE

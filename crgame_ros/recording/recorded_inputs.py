@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from crgame_ros.driver.replay_driver import ReplayDriver
-from crgame_ros.driver.source import parse_source, SourceSpec
+from crgame_ros.driver.source import parse_source, ReplayDriver, SourceSpec
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.events import AtStep, FiredEvent

@@ -10,8 +10,12 @@ from typing import NamedTuple
 
 from crgame_ros.errors import InputError
 from crgame_ros.messages.cdr import header_stamp_ns
-from crgame_ros.messages.joint_messages import from_joint_trajectory
-from crgame_ros.messages.joints import plan_from_joints, vehicle_joint_names, vehicles_from_joints
+from crgame_ros.messages.joints import (
+    from_joint_trajectory,
+    plan_from_joints,
+    vehicle_joint_names,
+    vehicles_from_joints,
+)
 from crgame_ros.messages.plan import Plan
 from crgame_ros.messages.request_layout import request_head
 from crgame_ros.recording.epochs import Epoch, read_epoch

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
-from crgame_ros.messages.joint_messages import MAP, NS_PER_S
-from crgame_ros.messages.joints import JointSeries
+from crgame_ros.messages.joints import JointSeries, MAP, NS_PER_S
 from crgame_ros.messages.status_values import Status
 import numpy as np
 from numpy.typing import NDArray

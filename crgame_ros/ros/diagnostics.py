@@ -1,14 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The statuses that nodes publish, all in one form and one time base."""
+"""What nodes report of themselves: statuses in one form, and log lines of repeated failures."""
 
 from collections.abc import Mapping
+from weakref import WeakKeyDictionary
 
+from crgame_ros.each_minute import EachMinute
 from crgame_ros.messages.status_values import Status
 from crgame_ros.ros.messages import to_time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+
+_TOLD: WeakKeyDictionary[Node, EachMinute] = WeakKeyDictionary()
 
 
 class Diagnostics:
@@ -58,3 +62,20 @@ class Diagnostics:
     def publish_status(self, status: Status, stamp_ns: int | None = None) -> None:
         """Publish one status on `/diagnostics`, as `publish` does."""
         self.publisher.publish(self.array_of(status, stamp_ns))
+
+
+def complain(node: Node, kind: str, text: str, *, failed: bool = False) -> None:
+    """
+    Log a failure, at most once a minute for each kind of a node's failures.
+
+    :param kind: as of `EachMinute.line`.
+    :param failed: log an error instead of a warning.
+    """
+    line = _TOLD.setdefault(node, EachMinute()).line(kind, text)
+    if line is None:
+        return
+    # rclpy wants one severity for each line of code that logs.
+    if failed:
+        node.get_logger().error(line)
+    else:
+        node.get_logger().warning(line)

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 from crgame_ros.errors import InputError
 from crgame_ros.messages.contract import Topic
 from crgame_ros.messages.status_values import printable
-from crgame_ros.ros.complaints import complain
-from crgame_ros.ros.diagnostics import Diagnostics
+from crgame_ros.ros.diagnostics import complain, Diagnostics
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.node import Node

@@ -7,7 +7,7 @@ from pathlib import Path
 import time
 import traceback
 
-from crgame_ros.ros.complaints import complain
+from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import PolledGroup
 from crgame_ros.ros.node_main import StopFlag
 from rclpy.executors import Executor, SingleThreadedExecutor

@@ -219,7 +219,7 @@ FILE_KINDS = {
     'steering': FileKind('crgame_ros.vehicle.steering', 'SteeringRatioTable',
                          'Table of steering ratios'),
     'device': FileKind('crgame_ros.driver.device_map', 'DeviceFile', 'Device map'),
-    'timeline': FileKind('crgame_ros.driver.timeline_file', 'TimelineFile', 'Scripted driver'),
+    'timeline': FileKind('crgame_ros.driver.timeline', 'TimelineFile', 'Scripted driver'),
     'occupancy': FileKind('crgame_ros.occupancy.map_file', 'MapEntry', 'Occupancy map'),
     'study': FileKind('crgame_ros.study.file', 'StudyFile', 'Study'),
     'questionnaire': FileKind('crgame_ros.study.questionnaire', 'Questionnaire', 'Questionnaire'),

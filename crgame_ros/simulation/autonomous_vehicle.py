@@ -19,8 +19,7 @@ from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
 from crgame_ros.messages.joints import JointSeries, plan_from_joints
 from crgame_ros.messages.plan import Plan
-from crgame_ros.planner.plan_check import check_plan
-from crgame_ros.planner.road_limit import RoadLimit
+from crgame_ros.planner.plan_check import check_plan, RoadLimit
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets, start_lanelet
 from crgame_ros.simulation.setup import AvSetup

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from crgame_ros.drivability.collision import PERMANENT_OBSTACLE
 from crgame_ros.drivability.contact import could_avoid, Course, Kind, kind_of, Side, touched_side
 from crgame_ros.drivability.monitor import VehicleDrivability
-from crgame_ros.drivability.permanent_obstacles import PERMANENT_OBSTACLE
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler

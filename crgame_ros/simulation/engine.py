@@ -13,8 +13,8 @@ from crgame_ros.game.events import FiredEvent, PlannerRun, TrafficOrder
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.game.task_documents import OpenPrompt, TaskEntry, TaskReport
 from crgame_ros.messages.joints import JointSeries
+from crgame_ros.planner.plan_check import RoadLimit
 from crgame_ros.planner.registry import EXTERNAL
-from crgame_ros.planner.road_limit import RoadLimit
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle, RouteLane
 from crgame_ros.simulation.av_models import (
     ego_of,

@@ -25,7 +25,7 @@ class RunObserver(Protocol):
     Measures or judges a run without taking part in it.
 
     Offline, `run_offline` calls the observers. Live, each is a node of its own
-    (`ros/observer_node.py`), so that none of them can delay the simulation.
+    (`ros/world_follower.py`), so that none of them can delay the simulation.
     """
 
     def observe(self, n: int, since_tick_s: float, vehicle_states: NDArray[np.float64],

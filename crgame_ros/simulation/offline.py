@@ -15,11 +15,9 @@ from crgame_ros.messages.joints import JointSeries, plan_to_joints
 from crgame_ros.messages.status_values import Status
 from crgame_ros.perception.perception import Perception
 from crgame_ros.planner.adapter import PlannerStatistics
-from crgame_ros.planner.failure_lines import FailureLines
 from crgame_ros.planner.interface import PlannerContext
-from crgame_ros.planner.manager import PlannerManager
+from crgame_ros.planner.manager import FailureLines, planner_status, PlannerManager
 from crgame_ros.planner.request_reader import RequestReader
-from crgame_ros.planner.status import planner_status
 from crgame_ros.simulation.autonomous_vehicle import AvCounters
 from crgame_ros.simulation.av_models import make_perception, published_states
 from crgame_ros.simulation.engine import Simulation, StepResult

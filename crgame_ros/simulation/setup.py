@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.driver.source import load_timeline, parse_source
-from crgame_ros.driver.timeline_file import timeline_text
+from crgame_ros.driver.timeline import timeline_text
 from crgame_ros.errors import InputError, one_line
 from crgame_ros.game.driven_vehicle import DrivenHuman
 from crgame_ros.game.game import AvSpec, Game

@@ -3,12 +3,16 @@
 """The global time controller: simulation time against the wall clock (CRG III-A2a)."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.game import TimingSpec
-from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
+
+if TYPE_CHECKING:
+    from crgame_ros.game.game import TimingSpec
 
 NS = 1e-9
+MIN_REAL_TIME_FACTOR = 0.1
+MAX_REAL_TIME_FACTOR = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +52,7 @@ class TimeController:
     :param dt_s: nominal step Delta t [s]
     """
 
-    def __init__(self, spec: TimingSpec, dt_s: float) -> None:
+    def __init__(self, spec: 'TimingSpec', dt_s: float) -> None:
         self._spec = spec
         self._dt_s = dt_s
         self._factor = 1.0

@@ -11,7 +11,7 @@ from browser_support import Browser
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.run_tables import tables_of
 from crgame_ros.game.view_documents import VIEW_PICTURE
-from crgame_ros.instruments.loopback import CONFIGURATION
+from crgame_ros.instruments.outlets import CONFIGURATION
 from crgame_ros.page_libraries import find_libraries
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import run_folder

@@ -9,7 +9,7 @@ from pathlib import Path
 import struct
 from typing import Any, NamedTuple
 
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.game.game import AvSpec, Game, HumanSpec
 from crgame_ros.messages.joints import object_joint_names, vehicle_joint_names
 from crgame_ros.paths import scenarios_directory

@@ -17,11 +17,10 @@ from typing import Any
 
 from aiohttp import ClientSession, CookieJar, Fingerprint, ServerFingerprintMismatch
 from cockpit_support import cockpit, get, HOST, in_loop, next_text, PumpBackend, wait_until
-from crgame_ros.cockpit import doorkeeper
+from crgame_ros.cockpit import request_guard
 from crgame_ros.cockpit.access import Access, reachable_addresses
 from crgame_ros.cockpit.exposure import Exposure, fingerprint, make_certificate, tls_context
-from crgame_ros.cockpit.invitations import Invitations
-from crgame_ros.cockpit.rights import Rights
+from crgame_ros.cockpit.rights import Invitations, Rights
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.errors import InputError
 import pytest
@@ -207,10 +206,10 @@ def test_all_addresses_are_those_that_others_can_open() -> None:
 @in_loop
 async def test_connections_that_ask_nothing_are_ended_and_bounded(
         monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doorkeeper, 'FIRST_REQUEST_S', 0.2)
-    monkeypatch.setattr(doorkeeper, 'NEXT_REQUEST_S', 0.4)
-    monkeypatch.setattr(doorkeeper, '_LOOK_S', 0.1)
-    monkeypatch.setattr(doorkeeper, 'MAX_OF_ADDRESS', 40)
+    monkeypatch.setattr(request_guard, 'FIRST_REQUEST_S', 0.2)
+    monkeypatch.setattr(request_guard, 'NEXT_REQUEST_S', 0.4)
+    monkeypatch.setattr(request_guard, '_LOOK_S', 0.1)
+    monkeypatch.setattr(request_guard, 'MAX_OF_ADDRESS', 40)
     async with cockpit() as running:
         joined = await running.join()
         await next_text(joined, 'hello')
@@ -235,7 +234,7 @@ async def test_connections_that_ask_nothing_are_ended_and_bounded(
 @in_loop
 async def test_those_who_say_nothing_make_room(monkeypatch: pytest.MonkeyPatch) -> None:
     """However many sockets of an address idle, its next browser is let in at once."""
-    monkeypatch.setattr(doorkeeper, 'MAX_OF_ADDRESS', 10)
+    monkeypatch.setattr(request_guard, 'MAX_OF_ADDRESS', 10)
     async with cockpit() as running:
         joined = await running.join()
         await next_text(joined, 'hello')

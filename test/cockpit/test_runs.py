@@ -15,8 +15,7 @@ from aiohttp import ClientSession, CookieJar, WSMsgType
 from cockpit_support import HOST, in_loop, PATIENCE_S, PumpBackend
 from crgame_ros.analysis.scores.run_scores import scores_of
 from crgame_ros.cockpit.access import Access
-from crgame_ros.cockpit.run_files import run_id
-from crgame_ros.cockpit.runs.archive import RunArchive
+from crgame_ros.cockpit.runs.archive import run_id, RunArchive
 from crgame_ros.cockpit.runs.routes import add_run_routes
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.recording.run_record import read_run_record

@@ -2,10 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Seats in the browser: their holders, and the effects of input, silence and absence."""
 
-from crgame_ros.cockpit.held_seat import HeldSeat, SILENCE_S
 from crgame_ros.cockpit.page_messages import Input
-from crgame_ros.cockpit.seat_orders import AGAIN_S, GIVE_UP_S, SeatOrders
-from crgame_ros.cockpit.seat_table import KEEP_S, SeatTable
+from crgame_ros.cockpit.seat_table import (
+    AGAIN_S,
+    GIVE_UP_S,
+    HeldSeat,
+    KEEP_S,
+    SeatOrders,
+    SeatTable,
+    SILENCE_S,
+)
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import SeatDemand, SeatEntry, SeatPerson, SEATS

@@ -5,7 +5,7 @@
 from collections import OrderedDict
 import copy
 
-from crgame_ros.cockpit.perception_frames import SensorMounts
+from crgame_ros.cockpit.message_frames import SensorMounts
 from crgame_ros.game.driven_vehicle import DrivenAv
 from crgame_ros.game.file import load_game
 from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec

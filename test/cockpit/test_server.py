@@ -21,7 +21,7 @@ from cockpit_support import (
     PumpBackend,
     wait_until,
 )
-from crgame_ros.cockpit import hub, page_files, server, session
+from crgame_ros.cockpit import hub, page_files, server
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.frames import FrameKind
 from crgame_ros.cockpit.page_messages import SeenView, Sound
@@ -255,10 +255,10 @@ async def test_too_many_waiting_requests_are_refused_one_by_one() -> None:
         running.backend.held.clear()
         await socket.send_json({'type': 'trigger', 'event': 'slow', 'id': 0})
         await wait_until(lambda: len(running.backend.commands) == 1, 'the first')
-        for number in range(1, session.MAX_REQUESTS + 2):
+        for number in range(1, server.MAX_REQUESTS + 2):
             await socket.send_json({'type': 'claim', 'seat': 'hv0', 'id': number})
         reply = await next_text(socket, 'reply')
-        assert (reply['to'], reply['ok']) == (session.MAX_REQUESTS + 1, False)
+        assert (reply['to'], reply['ok']) == (server.MAX_REQUESTS + 1, False)
         running.backend.held.set()
         assert (await next_text(socket, 'reply'))['ok']
         await socket.close()

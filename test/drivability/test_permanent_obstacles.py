@@ -5,8 +5,8 @@
 import math
 from pathlib import Path
 
+from crgame_ros.drivability.collision import PERMANENT_OBSTACLE, PermanentObstacles
 from crgame_ros.drivability.monitor import DrivabilityMonitor
-from crgame_ros.drivability.permanent_obstacles import PERMANENT_OBSTACLE, PermanentObstacles
 from crgame_ros.game.game import DrivabilitySpec
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.shape import Shape

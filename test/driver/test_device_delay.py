@@ -9,7 +9,7 @@ from crgame_ros.driver.device_map import load_device_map
 from crgame_ros.driver.evdev_device import EventDecoder, stamp_by_steady_clock
 from crgame_ros.driver.source import JoyDriver
 from crgame_ros.driver.wheel import GearButtons
-from crgame_ros.ros.device_delay import DeviceDelay
+from crgame_ros.ros.live_driver import DeviceDelay
 from evdev import ecodes, InputEvent
 import pytest
 

@@ -5,14 +5,13 @@
 import json
 from pathlib import Path
 
-from crgame_ros.cockpit.held_seat import HeldSeat
 from crgame_ros.cockpit.page_messages import parse_message
+from crgame_ros.cockpit.seat_table import HeldSeat
 from crgame_ros.driver.device_map import DeviceKind, load_device_maps
-from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons
-from crgame_ros.driver.replay_driver import ReplayDriver
-from crgame_ros.driver.source import JoyDriver, ScriptedDriver
-from crgame_ros.driver.timeline_file import parse_timeline, timeline_text
+from crgame_ros.driver.source import JoyDriver, ReplayDriver, ScriptedDriver
+from crgame_ros.driver.timeline import parse_timeline, timeline_text
 from crgame_ros.driver.watchdog import SeatWatchdog
+from crgame_ros.driver.wheel import IndicatorLever, LightButtons
 from crgame_ros.errors import InputError
 from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.lights import HAZARD, Light, lights_of, signals_document

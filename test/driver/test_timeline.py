@@ -6,8 +6,14 @@ import json
 from pathlib import Path
 
 from crgame_ros.driver.keyboard import KeyState
-from crgame_ros.driver.timeline import JoyTimeline, KeyTimeline, SCRIPTED_LAYOUT
-from crgame_ros.driver.timeline_file import parse_timeline, read_timeline, timeline_text
+from crgame_ros.driver.timeline import (
+    JoyTimeline,
+    KeyTimeline,
+    parse_timeline,
+    read_timeline,
+    SCRIPTED_LAYOUT,
+    timeline_text,
+)
 from crgame_ros.driver.wheel import normalize
 from crgame_ros.errors import InputError
 from crgame_ros.yaml_text import MAX_BYTES

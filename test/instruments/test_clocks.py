@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Clocks of instruments: the run's against the steady one, and a sender's that drifts."""
 
-from crgame_ros.instruments.clock_correction import clock_drift, corrected_s
-from crgame_ros.instruments.run_clock import CycleStarts, run_times_s
+from crgame_ros.instruments.run_clock import clock_drift, corrected_s, CycleStarts, run_times_s
 import numpy as np
 
 PPM = 1e-6

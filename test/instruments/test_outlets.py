@@ -14,7 +14,7 @@ SERVE = """
 import os, socket, sys
 from crgame_ros.game.instruments_spec import InstrumentsSpec
 from crgame_ros.instruments.outlets import configure, Outlet
-from crgame_ros.instruments.stream_description import MARKERS
+from crgame_ros.instruments.outlets import MARKERS
 local = sys.argv[1] == 'machine'
 configure(InstrumentsSpec(True, scope=sys.argv[1]))
 outlet = Outlet(MARKERS, '7', local)

@@ -16,7 +16,7 @@ import platform
 import sys
 import time
 
-from crgame_ros.instruments.loopback import CONFIGURATION
+from crgame_ros.instruments.outlets import CONFIGURATION
 from crgame_ros.ros.environment import prepare_environment
 import pylsl
 

@@ -8,8 +8,7 @@ import re
 
 from crgame_ros.game.file import load_game
 from crgame_ros.game.objects import ObjectStates
-from crgame_ros.messages.joint_messages import from_joint_trajectory
-from crgame_ros.messages.joints import vehicles_from_joints
+from crgame_ros.messages.joints import from_joint_trajectory, vehicles_from_joints
 from crgame_ros.perception.perception import Perception
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.roads.signals import TrafficLights

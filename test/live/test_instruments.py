@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.run_tables import write_tables
 from crgame_ros.game.documents import GAME
-from crgame_ros.instruments.loopback import CONFIGURATION
+from crgame_ros.instruments.outlets import CONFIGURATION
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import read_cycles
 from live_support import Launcher, PATIENCE_S, wait_until

@@ -4,8 +4,7 @@
 
 from collections.abc import Callable
 
-from crgame_ros.messages.joint_messages import from_joint_trajectory
-from crgame_ros.messages.joints import plan_from_joints, plan_to_joints
+from crgame_ros.messages.joints import from_joint_trajectory, plan_from_joints, plan_to_joints
 from crgame_ros.messages.plan import Plan
 from crgame_ros.ros.messages import from_time, to_joint_trajectory
 from crgame_ros.vehicle.state import VehicleState

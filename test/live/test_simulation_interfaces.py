@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 from action_msgs.msg import GoalStatus
-from crgame_ros.messages.joint_messages import MAP
+from crgame_ros.messages.joints import MAP
 from live_peer import Peer
 from live_support import CUT_IN, is_node, Launcher, SCENARIOS
 import pytest

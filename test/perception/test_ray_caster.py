@@ -9,9 +9,8 @@ from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.perception_spec import SensorSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.occupancy.occupancy import OccupancyGrid
-from crgame_ros.perception.bodies import SensedBodies
 from crgame_ros.perception.ray_caster import RayCaster
-from crgame_ros.perception.sensors import NOTHING, PERMANENT, Scan
+from crgame_ros.perception.sensors import NOTHING, PERMANENT, Scan, SensedBodies
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -9,9 +9,9 @@ import time
 from crgame_ros.game.driven_vehicle import DrivenAv
 from crgame_ros.game.perception_spec import LocalisationSpec, SensorSpec
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
+from crgame_ros.nodes.marker_node import sensor_transforms, Transforms, vehicle_transforms
+from crgame_ros.nodes.perception_node import LocalizationMessage, ScanMessages
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.perception_messages import LocalizationMessage, ScanMessages
-from crgame_ros.ros.transforms import sensor_transforms, Transforms, vehicle_transforms
 from geometry_msgs.msg import TransformStamped
 import numpy as np
 from numpy.typing import NDArray

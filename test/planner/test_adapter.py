@@ -13,9 +13,8 @@ from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.adapter import PlannerAdapter
 from crgame_ros.planner.idm import IdmPlanner
 from crgame_ros.planner.interface import Planner, PlannerContext
-from crgame_ros.planner.plan_check import check_plan
-from crgame_ros.planner.road_limit import RoadLimit
-from crgame_ros.planner.rollout import braking_plan
+from crgame_ros.planner.path_following import braking_plan
+from crgame_ros.planner.plan_check import check_plan, RoadLimit
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import StateColumn, VehicleState
 import numpy as np

@@ -10,8 +10,8 @@ from crgame_ros.geometry.polyline import ReferencePath
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.messages.plan import PlanRequest
 from crgame_ros.planner.adapter import PlannerAdapter
-from crgame_ros.planner.clearance import Clearance
 from crgame_ros.planner.interface import PlannerContext
+from crgame_ros.planner.path_obstacles import Clearance
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.state import StateColumn, VehicleState
 import numpy as np

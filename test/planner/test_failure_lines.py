@@ -7,8 +7,7 @@ import re
 
 from crgame_ros import each_minute
 from crgame_ros.each_minute import EachMinute
-from crgame_ros.planner.failure_lines import FailureLines
-from crgame_ros.planner.manager import PlannerManager
+from crgame_ros.planner.manager import FailureLines, PlannerManager
 from crgame_ros.vehicle.state import VehicleState
 import planner_support as support
 import pytest

@@ -10,7 +10,7 @@ import sys
 from typing import Any
 
 from crgame_ros.cli import main
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.game.documents import EVENTS, FiredEvents, GAME, OBJECTS
 from crgame_ros.game.game import AvSpec, Game, HumanSpec
 from crgame_ros.messages.instrument_samples import (

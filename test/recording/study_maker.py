@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.recording.run_folder import FINISHED_MARK
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup

@@ -29,7 +29,7 @@ class Mine(ConstantVelocityPlanner):
 STANDING_PLANNER = '''
 from dataclasses import replace
 
-from crgame_ros.planner.rollout import braking_plan
+from crgame_ros.planner.path_following import braking_plan
 from crgame_ros.planner.constant_velocity import ConstantVelocityPlanner
 
 

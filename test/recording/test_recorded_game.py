@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from crgame_ros.cli import main
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GAME
 from crgame_ros.game.file import load_game

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from commonroad.common.reader.file_reader_xml import XMLFileReader
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, LaneletSpawn, TimingSpec
 from crgame_ros.paths import scenarios_directory

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import AvSpec
 from crgame_ros.recording.run_cycles import read_cycles, replay_inputs

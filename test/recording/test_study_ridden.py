@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from crgame_ros.cli import main
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.study.file import load_study
 import numpy as np

@@ -10,7 +10,7 @@ from crgame_ros.driver.force_feedback import FULL_LEVEL, SteeringTorque
 from crgame_ros.nodes.driver_node import DriverNode
 from crgame_ros.ros import live_driver
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.live_force import LiveForce
+from crgame_ros.ros.live_driver import LiveForce
 from crgame_ros.ros.messages import from_time, to_time
 from crgame_ros.ros.node_main import StopFlag
 from crgame_ros.vehicle.parameters import load_vehicle_parameters

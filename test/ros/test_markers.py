@@ -13,7 +13,7 @@ from crgame_ros.geometry.outline import outline
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.messages.joints import JointSeries, object_joint_names, vehicle_joint_names
-from crgame_ros.nodes.markers import style
+from crgame_ros.nodes.markers import bodies
 from crgame_ros.nodes.markers.bodies import Body
 from crgame_ros.nodes.markers.markers import AvPaths, SceneMarkers
 from crgame_ros.nodes.markers.roads import line_segments, map_markers, NAMESPACES
@@ -100,14 +100,14 @@ def test_the_road_is_what_the_lanelets_enclose(setup: Setup) -> None:
     assert {tuple(row) for row in corners.reshape(-1, 2).tolist()} == {
         tuple(row) for row in vertices[:, :2].tolist()}
     # The strip on which the cars are parked is no lane for cars: it has a surface of its own.
-    assert {_rgb(marker) for marker in roads} == {style.ROAD, style.PATHS}
+    assert {_rgb(marker) for marker in roads} == {bodies.ROAD, bodies.PATHS}
 
 
 def test_solid_lines_follow_the_bounds() -> None:
     """Each solid bound of the motorway is there from vertex to vertex, shared ones once."""
     loaded = load_scenario(SCENARIOS / 'ZAM_CutIn-1_1_T-1.xml')
     lines = [marker for marker in map_markers(loaded) if marker.ns == 'lane_lines']
-    assert [_rgb(marker) for marker in lines] == [style.WHITE]
+    assert [_rgb(marker) for marker in lines] == [bodies.WHITE]
     segments = _points(lines[0]).reshape(-1, 4)
     drawn = {tuple(row) for row in segments.tolist()}
     assert len(drawn) == len(segments)
@@ -211,8 +211,8 @@ def test_objects_stand_at_their_centres(setup: Setup, scene: SceneMarkers) -> No
         assert (body.scale.x, body.scale.y) == (item.shape.length, item.shape.width)
         assert (body.pose.position.x, body.pose.position.y) == tuple(objects.poses[row, :2])
         assert markers['labels', number].text == item.id
-    assert kinds == {('parkedVehicle', Marker.CUBE, style.GREY, False),
-                     ('pedestrian', Marker.CYLINDER, style.PURPLE, True)}
+    assert kinds == {('parkedVehicle', Marker.CUBE, bodies.GREY, False),
+                     ('pedestrian', Marker.CYLINDER, bodies.PURPLE, True)}
 
 
 @pytest.mark.parametrize(('kind', 'role', 'code'), [
@@ -223,7 +223,7 @@ def test_objects_stand_at_their_centres(setup: Setup, scene: SceneMarkers) -> No
     ids=['human', 'av', 'recorded', 'traffic', 'static', 'cyclist', 'pedestrian', 'scripted'])
 def test_colour_tells_the_role(kind: str, role: Role, code: str) -> None:
     """The palette of Okabe and Ito: people outside cars by what they are, others by role."""
-    body = Body(style.map_header(), 0, ObjectDescription('o1', kind, role,
+    body = Body(bodies.map_header(), 0, ObjectDescription('o1', kind, role,
                                                          Shape.rectangle(4.0, 2.0)))
     assert _rgb(body.markers[0]) == code
 
@@ -231,7 +231,7 @@ def test_colour_tells_the_role(kind: str, role: Role, code: str) -> None:
 def test_a_polygon_is_filled() -> None:
     """The triangles of an L of 3 m^2 have its area, and its corners."""
     corners = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
-    body = Body(style.map_header(), 0, ObjectDescription('o1', 'building', Role.STATIC,
+    body = Body(bodies.map_header(), 0, ObjectDescription('o1', 'building', Role.STATIC,
                                                          Shape.polygon(corners)))
     triangles = _points(body.markers[0]).reshape(-1, 3, 2)
     first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
@@ -244,9 +244,9 @@ def test_a_polygon_is_filled() -> None:
 def test_brake_lights_of_driven_vehicles(setup: Setup, scene: SceneMarkers) -> None:
     """They light from 0.7 m/s^2 against the motion on (ECE R13-H), also when reversing."""
     states = np.array([vehicle.state for vehicle in setup.vehicles])
-    for speed, acceleration, code in ((10.0, -0.6, style.BRAKE_OFF), (10.0, -0.8, style.BRAKE_ON),
-                                      (-2.0, -0.8, style.BRAKE_OFF), (-2.0, 0.8, style.BRAKE_ON),
-                                      (0.0, -0.8, style.BRAKE_OFF)):
+    on, off = bodies.BRAKE_ON, bodies.BRAKE_OFF
+    for speed, acceleration, code in ((10.0, -0.6, off), (10.0, -0.8, on), (-2.0, -0.8, off),
+                                      (-2.0, 0.8, on), (0.0, -0.8, off)):
         states[0, 3], states[0, 5] = speed, acceleration
         scene.set_vehicles(states, OFFSET_NS)
         assert _rgb(_by_key(scene.message().markers)['brake_lights', 0]) == code
@@ -266,11 +266,11 @@ def test_traffic_brakes_move_on_and_vanish() -> None:
         scene.set_vehicles(states, OFFSET_NS + since_ns)
         markers = _by_key(scene.message().markers)
         assert markers['objects', number].pose.position.x == pytest.approx(x, abs=1e-12)
-        assert _rgb(markers['brake_lights', number]) == style.BRAKE_OFF
+        assert _rgb(markers['brake_lights', number]) == bodies.BRAKE_OFF
     slower = velocities.copy()
     slower[0, 0] = 9.9
     scene.set_objects(ObjectStates(poses, slower), OFFSET_NS + TICK_NS)
-    assert _rgb(_by_key(scene.message().markers)['brake_lights', number]) == style.BRAKE_ON
+    assert _rgb(_by_key(scene.message().markers)['brake_lights', number]) == bodies.BRAKE_ON
     gone = poses.copy()
     gone[0] = math.nan
     scene.set_objects(ObjectStates(gone, np.full((count, 3), math.nan)), OFFSET_NS + 2 * TICK_NS)
@@ -345,7 +345,7 @@ def test_prediction_is_drawn_in_map() -> None:
     names = (*vehicle_joint_names('av0'),
              *vehicle_joint_names('hv0'), *object_joint_names('o1'),
              *object_joint_names('o2'))
-    paths = AvPaths(style.map_header(), 0, 'av0', transform, {})
+    paths = AvPaths(bodies.map_header(), 0, 'av0', transform, {})
     paths.set_prediction(_series(names, positions))
     assert not paths.perceived.present
     segments = _points(paths.prediction.markers[0]).reshape(-1, 2, 2)
@@ -380,7 +380,7 @@ def test_what_an_av_knows_of_is_outlined_where_it_takes_it_to_be() -> None:
     names = [*vehicle_joint_names('av0'), *(
         name for key in poses if key != 'av0' for name in object_joint_names(key))]
     outlines = {key: outline(shape) + (ahead[key], 0.0) for key, shape in shapes.items()}
-    paths = AvPaths(style.map_header(), 0, 'av0', transform, outlines)
+    paths = AvPaths(bodies.map_header(), 0, 'av0', transform, outlines)
     paths.set_prediction(_series(tuple(names), positions))
     assert paths.perceived.present
     drawn = shapely.union_all(shapely.linestrings(

@@ -6,8 +6,8 @@ import threading
 import time
 
 from crgame_ros.errors import InputError
-from crgame_ros.ros import other_simulation
-from crgame_ros.ros.other_simulation import refuse_another
+from crgame_ros.nodes import sim_node
+from crgame_ros.nodes.sim_node import refuse_another
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from live_peer import Peer
 from live_support import PATIENCE_S
@@ -24,7 +24,7 @@ def test_another_simulation_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
         there.node.create_publisher(Clock, 'clock', 1)
         here.wait_until(lambda: here.node.count_publishers('clock'), 'the clock')
         with monkeypatch.context() as patch:
-            patch.setattr(other_simulation, 'ALIVE_S', 1.0)
+            patch.setattr(sim_node, 'ALIVE_S', 1.0)
             refuse_another(here.node, time.monotonic())
         says = there.node.create_publisher(DiagnosticArray, 'diagnostics', 10)
         silent = threading.Event()
@@ -36,7 +36,7 @@ def test_another_simulation_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
         speaker = threading.Thread(target=say)
         speaker.start()
         try:
-            monkeypatch.setattr(other_simulation, 'ALIVE_S', PATIENCE_S)
+            monkeypatch.setattr(sim_node, 'ALIVE_S', PATIENCE_S)
             with pytest.raises(InputError, match='another simulation runs in namespace / '):
                 refuse_another(here.node, time.monotonic())
         finally:

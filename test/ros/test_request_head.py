@@ -3,8 +3,7 @@
 """The head of a plan request equals what rclpy's own decoder reads."""
 
 from crgame_ros.errors import InputError
-from crgame_ros.messages.joint_messages import from_joint_trajectory
-from crgame_ros.messages.joints import JointSeries
+from crgame_ros.messages.joints import from_joint_trajectory, JointSeries
 from crgame_ros.messages.request_layout import request_head
 from crgame_ros.ros.messages import to_joint_trajectory
 import numpy as np

@@ -9,8 +9,8 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from crgame_ros.errors import InputError
-from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import (
+    from_joint_trajectory,
     JointSeries,
     plan_from_joints,
     plan_to_joints,

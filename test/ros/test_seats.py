@@ -6,14 +6,13 @@ from collections.abc import Iterator
 import json
 from typing import NamedTuple
 
-from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.driver.seat_state import GAME_DRIVER
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.game.file import load_game
 from crgame_ros.recording.recorded_inputs import RecordedInputs
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import to_joy
-from crgame_ros.ros.seat import COMMAND_DEPTH, Seat
-from crgame_ros.ros.seats import MAX_ORDERS, Seats
+from crgame_ros.ros.seats import COMMAND_DEPTH, MAX_ORDERS, Seat, Seats
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from live_peer import Peer

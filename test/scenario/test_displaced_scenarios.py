@@ -7,7 +7,7 @@ import re
 import time
 
 from crgame_ros.cli import main
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.errors import InputError
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory

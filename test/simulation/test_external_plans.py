@@ -9,7 +9,7 @@ import time
 from crgame_ros.game.game import DrivabilitySpec, Game
 from crgame_ros.messages.joints import JointSeries, plan_to_joints
 from crgame_ros.messages.plan import Plan
-from crgame_ros.planner.road_limit import RoadLimit
+from crgame_ros.planner.plan_check import RoadLimit
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.simulation.setup import build_setup

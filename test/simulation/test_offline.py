@@ -6,8 +6,7 @@ from dataclasses import replace
 import math
 from typing import ClassVar
 
-from crgame_ros.driver.replay_driver import ReplayDriver
-from crgame_ros.driver.source import DriverSource
+from crgame_ros.driver.source import DriverSource, ReplayDriver
 from crgame_ros.errors import InputError
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import AvSpec, DrivabilitySpec, HumanSpec

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from crgame_ros.analysis.behaviour.lane_keeping import keep_lane
 from crgame_ros.analysis.scores.scored_run import score_run
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import DrivabilitySpec, HumanSpec, PoseSpawn
 from crgame_ros.game.objects import ObjectStates

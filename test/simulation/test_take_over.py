@@ -4,7 +4,7 @@
 
 import math
 
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.simulation.engine import Simulation
 from crgame_ros.simulation.offline import run_offline

@@ -5,7 +5,7 @@
 from dataclasses import replace
 
 from crgame_ros.game.game import TimingSpec
-from crgame_ros.timing.frame_skipping import FrameSkipping
+from crgame_ros.timing.publishing import FrameSkipping
 
 SPEC = TimingSpec(skip_threshold=0.02)
 

@@ -7,7 +7,7 @@ import sys
 
 LOCKED = """
 from pathlib import Path
-from crgame_ros.timing.time_slice import lock_memory
+from crgame_ros.timing.thread_counters import lock_memory
 given = lock_memory()
 lines = Path('/proc/self/status').read_text().splitlines()
 (locked,) = [int(line.split()[1]) for line in lines if line.startswith('VmLck')]

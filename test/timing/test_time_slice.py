@@ -6,7 +6,7 @@ import os
 import platform
 import threading
 
-from crgame_ros.timing.time_slice import shorten_time_slice, SHORTEST_NS, time_slice_ns
+from crgame_ros.timing.thread_counters import shorten_time_slice, SHORTEST_NS, time_slice_ns
 import pytest
 
 pytestmark = pytest.mark.clock

@@ -1,19 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The past runs that a page may show: those of the session and of the folder around it."""
+"""The past runs that a page may show, and the files of each."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+import hashlib
 import json
+import os
 from pathlib import Path
 import re
 
 from crgame_ros.cockpit.page_messages import clean_text
-from crgame_ros.cockpit.run_files import RUN_FILES, run_id
 from crgame_ros.errors import InputError
 from crgame_ros.game.file import load_game
 from crgame_ros.recording.metadata import METADATA_FILE
-from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, run_folders
+from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, run_folder, run_folders
 
 MAX_RUNS = 500
 MAX_TITLE = 80
@@ -22,6 +23,8 @@ GAME = 'game.yaml'
 CLAIM = '.started'
 PICTURE = '.picture.svg'
 _TIMES = re.compile(r'nanoseconds(?:_since_epoch)?: (\d{1,19})')
+# Patterns of a run's files: its game, its recordings and the files made from them.
+RUN_FILES = ('game.yaml', 'bag*', '*.xml', 'timing*.json', 'report*.html')
 
 
 @dataclass(frozen=True)
@@ -214,3 +217,36 @@ def _remove(run: PastRun) -> None:
         except OSError:
             # The folder holds something else: another run of the session, or a foreign file.
             continue
+
+
+def run_id(folder: Path) -> str:
+    """Return the id of a run on pages, which does not reveal its path."""
+    return hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:16]
+
+
+def files_document(session: Path, epoch: int) -> dict[str, object]:
+    """
+    Return the files document.
+
+    :param session: folder of the session.
+    :param epoch: epoch of the run.
+    """
+    folder = run_folder(session, epoch)
+    names = [path.name for kind in RUN_FILES for path in sorted(folder.glob(kind))]
+    # Only the terminal of this machine shows the path.
+    name = folder.relative_to(session.parent).as_posix()
+    complete = (folder / FINISHED_MARK).exists()
+    return {'epoch': epoch, 'run': run_id(folder), 'folder': name, 'names': names,
+            'complete': complete, 'contacts': _recorded_contacts(folder) if complete else []}
+
+
+def _recorded_contacts(folder: Path) -> list[dict[str, object]]:
+    """Return the contacts in the timing reports of a run."""
+    found: list[dict[str, object]] = []
+    for path in sorted(folder.glob('timing*.json')):
+        try:
+            found.extend(json.loads(path.read_text()).get('contacts') or [])
+        except (OSError, ValueError, AttributeError):
+            # The file was moved or changed: the page then reports the contact without details.
+            continue
+    return found

@@ -13,7 +13,7 @@ from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.scores.measures import SCORE_MEASURES
 from crgame_ros.analysis.scores.nuplan import NuplanScore, WEIGHTS
 from crgame_ros.analysis.scores.run_scores import scores_of
-from crgame_ros.cockpit.job_loop import serve_jobs
+from crgame_ros.cockpit.job_process import serve_jobs
 from crgame_ros.recording.run_record import read_run_record
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.whole_file import write_text

@@ -30,8 +30,7 @@ from crgame_ros.game.view_documents import ViewPicture
 from crgame_ros.nodes.cockpit.feed import CockpitFeed
 from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.nodes.cockpit.seat_desk import PeopleFeed, SeatDesk
-from crgame_ros.ros.complaints import complain
-from crgame_ros.ros.diagnostics import Diagnostics
+from crgame_ros.ros.diagnostics import complain, Diagnostics
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.spinning import attempt
 from diagnostic_msgs.msg import DiagnosticStatus

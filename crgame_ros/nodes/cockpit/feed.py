@@ -12,8 +12,8 @@ from crgame_ros.analysis.criticality.rows import CRITICALITY_TOPIC
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.message_frames import MessageFrames
-from crgame_ros.cockpit.run_files import files_document
 from crgame_ros.cockpit.run_status import RunStatus
+from crgame_ros.cockpit.runs.archive import files_document
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import EVENTS, GameDocument, SIGNALS

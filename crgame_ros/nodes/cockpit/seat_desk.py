@@ -5,7 +5,6 @@
 import time
 
 from crgame_ros.cockpit.client import Client
-from crgame_ros.cockpit.held_seat import HeldSeat
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.page_messages import (
     Answer,
@@ -18,8 +17,7 @@ from crgame_ros.cockpit.page_messages import (
     SeatOrder,
 )
 from crgame_ros.cockpit.run_status import RunStatus
-from crgame_ros.cockpit.seat_orders import SeatOrders
-from crgame_ros.cockpit.seat_table import SeatTable
+from crgame_ros.cockpit.seat_table import HeldSeat, SeatOrders, SeatTable
 from crgame_ros.driver.seat_state import GAME_DRIVER
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import CrgameError, InputError

@@ -1,19 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The markers of one thing that may come, move and vanish: a body, a line, a traffic light."""
+"""The markers of one thing that may come, move and vanish; colours for the colour-blind."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 import math
 
+from builtin_interfaces.msg import Duration
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.nodes.markers import style
+from crgame_ros.messages.joints import MAP
 from geometry_msgs.msg import Point, Pose
 import numpy as np
 from numpy.typing import NDArray
 import shapely
-from std_msgs.msg import Header
+from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
 
 FloatArray = NDArray[np.float64]
@@ -23,6 +24,18 @@ LIFETIME_S = 5
 LABEL_HEIGHT = 1.2
 LIGHT_DIAMETER = 1.2
 LIGHT_Z = 3.0
+# The palette of Okabe and Ito, with greys and a lavender.
+ORANGE, SKY_BLUE, GREEN, YELLOW = '#E69F00', '#56B4E9', '#009E73', '#F0E442'
+VERMILLION, PURPLE, LAVENDER = '#D55E00', '#CC79A7', '#B3A2E8'
+WHITE, LIGHT_GREY, GREY, DARK_GREY = '#FFFFFF', '#C8C8C8', '#999999', '#666666'
+ROAD, PATHS, INK = '#3A3D42', '#5A5D63', '#101010'
+BRAKE_ON, BRAKE_OFF = '#FF1010', '#500000'
+ROLE_COLOURS = {Role.HUMAN: ORANGE, Role.AUTONOMOUS: SKY_BLUE, Role.RECORDED: LIGHT_GREY,
+                Role.STATIC: GREY, Role.TRAFFIC: GREEN, Role.SCRIPTED: LAVENDER}
+LIGHT_COLOURS = {'red': VERMILLION, 'redYellow': ORANGE, 'yellow': YELLOW, 'green': GREEN,
+                 'inactive': DARK_GREY}
+SOFT_TYPES = frozenset({'pedestrian', 'bicycle'})
+MOTOR_TYPES = frozenset({'car', 'truck', 'bus', 'motorcycle', 'taxi', 'priorityVehicle'})
 
 
 class Item:
@@ -65,7 +78,7 @@ class Body(Item):
         if item.role is not Role.STATIC:
             markers.append(_heading(header, number, item.shape, self._half_height))
         self._lights: Marker | None = None
-        if item.type in style.MOTOR_TYPES and item.role is not Role.STATIC:
+        if item.type in MOTOR_TYPES and item.role is not Role.STATIC:
             self._lights = _brake_lights(header, number, item.shape, self._half_height)
             markers.append(self._lights)
         # All parts fixed to the body share one pose; the label is drawn above it.
@@ -73,12 +86,12 @@ class Body(Item):
         self._pose.position.z = self._half_height
         for marker in markers:
             marker.pose = self._pose
-        self._label = style.blank(header, 'labels', number, Marker.TEXT_VIEW_FACING,
-                                  style.colour(style.WHITE), (0.0, 0.0, LABEL_HEIGHT), LIFETIME_S)
+        self._label = blank(header, 'labels', number, Marker.TEXT_VIEW_FACING,
+                            colour(WHITE), (0.0, 0.0, LABEL_HEIGHT), LIFETIME_S)
         self._label.text = item.id
         self._label.pose.position.z = height + LABEL_HEIGHT
         super().__init__((*markers, self._label))
-        self._on, self._off = style.colour(style.BRAKE_ON), style.colour(style.BRAKE_OFF)
+        self._on, self._off = colour(BRAKE_ON), colour(BRAKE_OFF)
 
     def place(self, x: float, y: float, yaw: float, braking: bool) -> None:
         """
@@ -135,9 +148,9 @@ class LightMarker(Item):
     """
 
     def __init__(self, header: Header, light_id: int, place: FloatArray) -> None:
-        marker = style.blank(header, 'lights', light_id, Marker.SPHERE,
-                             style.colour(style.LIGHT_COLOURS['inactive']),
-                             (LIGHT_DIAMETER,) * 3, LIFETIME_S)
+        marker = blank(header, 'lights', light_id, Marker.SPHERE,
+                       colour(LIGHT_COLOURS['inactive']),
+                       (LIGHT_DIAMETER,) * 3, LIFETIME_S)
         marker.pose.position.x, marker.pose.position.y = place.tolist()
         marker.pose.position.z = LIGHT_Z
         super().__init__((marker,))
@@ -145,21 +158,21 @@ class LightMarker(Item):
 
     def show(self, state: str) -> None:
         """Set the colour of a state in its XML spelling; an unknown state counts as inactive."""
-        code = style.LIGHT_COLOURS.get(state, style.LIGHT_COLOURS['inactive'])
-        self.markers[0].color = style.colour(code)
+        code = LIGHT_COLOURS.get(state, LIGHT_COLOURS['inactive'])
+        self.markers[0].color = colour(code)
 
 
 def _box(header: Header, namespace: str, number: int, item: ObjectDescription,
          height: float) -> Marker:
-    shape, paint = item.shape, style.colour(style.body_colour(item))
+    shape, paint = item.shape, colour(body_colour(item))
     if shape.kind == 'polygon':
-        marker = style.blank(header, namespace, number, Marker.TRIANGLE_LIST, paint,
-                             lifetime_s=LIFETIME_S)
-        marker.points = style.points(_triangles(shape).tolist(), 0.5 * height)
+        marker = blank(header, namespace, number, Marker.TRIANGLE_LIST, paint,
+                       lifetime_s=LIFETIME_S)
+        marker.points = points(_triangles(shape).tolist(), 0.5 * height)
         return marker
     kind = Marker.CYLINDER if shape.kind == 'circle' else Marker.CUBE
-    return style.blank(header, namespace, number, kind, paint,
-                       (shape.length, shape.width, height), LIFETIME_S)
+    return blank(header, namespace, number, kind, paint,
+                 (shape.length, shape.width, height), LIFETIME_S)
 
 
 def _triangles(shape: Shape) -> FloatArray:
@@ -172,17 +185,56 @@ def _triangles(shape: Shape) -> FloatArray:
 
 def _heading(header: Header, number: int, shape: Shape, top: float) -> Marker:
     """Draw a wedge on the roof that points forward."""
-    marker = style.blank(header, 'heading', number, Marker.TRIANGLE_LIST,
-                         style.colour(style.INK, 0.8), lifetime_s=LIFETIME_S)
+    marker = blank(header, 'heading', number, Marker.TRIANGLE_LIST,
+                   colour(INK, 0.8), lifetime_s=LIFETIME_S)
     tip, base = 0.5 * shape.length, 0.5 * shape.length - min(shape.width, 0.5 * shape.length)
-    marker.points = style.points(
+    marker.points = points(
         ((tip, 0.0), (base, 0.4 * shape.width), (base, -0.4 * shape.width)), top + 0.03)
     return marker
 
 
 def _brake_lights(header: Header, number: int, shape: Shape, top: float) -> Marker:
-    marker = style.blank(header, 'brake_lights', number, Marker.CUBE_LIST,
-                         style.colour(style.BRAKE_OFF), (0.4, 0.3 * shape.width, 0.1), LIFETIME_S)
+    marker = blank(header, 'brake_lights', number, Marker.CUBE_LIST,
+                   colour(BRAKE_OFF), (0.4, 0.3 * shape.width, 0.1), LIFETIME_S)
     rear, side = 0.2 - 0.5 * shape.length, 0.35 * shape.width
-    marker.points = style.points(((rear, side), (rear, -side)), top)
+    marker.points = points(((rear, side), (rear, -side)), top)
     return marker
+
+
+def colour(code: str, alpha: float = 1.0) -> ColorRGBA:
+    """Return a colour of the form #RRGGBB as a message."""
+    red, green, blue = (int(code[place:place + 2], 16) / 255.0 for place in (1, 3, 5))
+    return ColorRGBA(r=red, g=green, b=blue, a=alpha)
+
+
+def body_colour(item: ObjectDescription) -> str:
+    """Return the colour of an object; people outside cars stand out."""
+    return PURPLE if item.type in SOFT_TYPES else ROLE_COLOURS[item.role]
+
+
+def blank(header: Header, namespace: str, number: int, kind: int, paint: ColorRGBA,
+          scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
+          lifetime_s: int = 0) -> Marker:
+    """
+    Build a marker at the origin of map.
+
+    :param header: shared by the markers of a message.
+    :param number: id, unique in the namespace.
+    :param kind: Marker.CUBE …
+    :param lifetime_s: time after which viewers drop it, 0 for never [s]
+    """
+    marker = Marker(header=header, ns=namespace, id=number, type=kind, action=Marker.ADD,
+                    color=paint, lifetime=Duration(sec=lifetime_s))
+    marker.pose.orientation.w = 1.0
+    marker.scale.x, marker.scale.y, marker.scale.z = scale
+    return marker
+
+
+def map_header() -> Header:
+    """Return a header in frame map."""
+    return Header(frame_id=MAP)
+
+
+def points(rows: Iterable[Iterable[float]], z: float) -> list[Point]:
+    """Return (x, y) points as messages, all at one height [m]."""
+    return [Point(x=x, y=y, z=z) for x, y in rows]

@@ -10,7 +10,7 @@ from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joints import JointSeries, vehicle_joint_names
 from crgame_ros.messages.request_layout import RequestLayout
-from crgame_ros.nodes.markers import style
+from crgame_ros.nodes.markers import bodies
 from crgame_ros.nodes.markers.bodies import (
     Body,
     Item,
@@ -55,7 +55,7 @@ class SceneMarkers:
         self._loaded = documents.loaded
         game = documents.game
         self._problems = [av.planning_problem for av in game.avs]
-        self._header: Header = style.map_header()
+        self._header: Header = bodies.map_header()
         self._bodies = [Body(self._header, number, item)
                         for number, item in enumerate(documents.objects)]
         self._vehicles = len(documents.driven)
@@ -85,7 +85,7 @@ class SceneMarkers:
 
         :param clear: whether to delete everything shown before.
         """
-        first = [Marker(header=style.map_header(), action=Marker.DELETEALL)] if clear else []
+        first = [Marker(header=bodies.map_header(), action=Marker.DELETEALL)] if clear else []
         return MarkerArray(markers=[*first, *map_markers(self._loaded, self._problems)])
 
     def set_vehicles(self, states: FloatArray, stamp_ns: int) -> None:
@@ -174,14 +174,14 @@ class AvPaths:
         self._outlines = outlines
         self._own = av_id
         self._names = vehicle_joint_names(av_id)
-        self.plan = Line(style.blank(
-            header, 'plan', number, Marker.LINE_STRIP, style.colour(style.SKY_BLUE),
+        self.plan = Line(bodies.blank(
+            header, 'plan', number, Marker.LINE_STRIP, bodies.colour(bodies.SKY_BLUE),
             (0.4, 0.0, 0.0), LIFETIME_S), PLAN_Z)
-        self.prediction = Line(style.blank(
-            header, 'prediction', number, Marker.LINE_LIST, style.colour(style.YELLOW, 0.7),
+        self.prediction = Line(bodies.blank(
+            header, 'prediction', number, Marker.LINE_LIST, bodies.colour(bodies.YELLOW, 0.7),
             (0.2, 0.0, 0.0), LIFETIME_S), PREDICTION_Z)
-        self.perceived = Line(style.blank(
-            header, 'perceived', number, Marker.LINE_LIST, style.colour(style.VERMILLION),
+        self.perceived = Line(bodies.blank(
+            header, 'perceived', number, Marker.LINE_LIST, bodies.colour(bodies.VERMILLION),
             (0.15, 0.0, 0.0), LIFETIME_S), PERCEIVED_Z)
         self._plan_end_ns = 0
         self._prediction_end_ns = 0

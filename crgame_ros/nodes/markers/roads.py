@@ -11,7 +11,7 @@ from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from commonroad.scenario.traffic_light import TrafficLight
 from crgame_ros.geometry.curve import Curve
-from crgame_ros.nodes.markers import style
+from crgame_ros.nodes.markers import bodies
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signs import stop_line_ends
 from crgame_ros.scenario.exact_values import group_outline
@@ -42,8 +42,8 @@ class Paint:
     z: float
 
 
-NARROW, BROAD = Paint(0.15, style.WHITE, LINE_Z), Paint(0.3, style.WHITE, LINE_Z)
-CURB, FAINT = Paint(0.15, style.LIGHT_GREY, FAINT_Z), Paint(0.08, style.GREY, FAINT_Z)
+NARROW, BROAD = Paint(0.15, bodies.WHITE, LINE_Z), Paint(0.3, bodies.WHITE, LINE_Z)
+CURB, FAINT = Paint(0.15, bodies.LIGHT_GREY, FAINT_Z), Paint(0.08, bodies.GREY, FAINT_Z)
 PAINTS = (NARROW, BROAD, CURB, FAINT)
 # Paint and lines of each line marking; a line is its offset to the left [m] and dashed or not.
 MARKINGS: dict[str, tuple[Paint, tuple[tuple[float, bool], ...]]] = {
@@ -88,13 +88,13 @@ def light_positions(network: LaneletNetwork) -> dict[int, FloatArray]:
 def _roads(network: LaneletNetwork) -> Iterator[Marker]:
     roads = RoadNetwork(network)
     for number, (for_cars, code, z) in enumerate((
-            (True, style.ROAD, ROAD_Z), (False, style.PATHS, PATHS_Z))):
-        marker = style.blank(style.map_header(), 'road', number, Marker.TRIANGLE_LIST,
-                             style.colour(code))
+            (True, bodies.ROAD, ROAD_Z), (False, bodies.PATHS, PATHS_Z))):
+        marker = bodies.blank(bodies.map_header(), 'road', number, Marker.TRIANGLE_LIST,
+                             bodies.colour(code))
         chosen = [_surface(lanelet) for lanelet in network.lanelets
                   if roads.is_drivable(lanelet.lanelet_id) == for_cars]
         if chosen:
-            marker.points = style.points(np.concatenate(chosen).tolist(), z)
+            marker.points = bodies.points(np.concatenate(chosen).tolist(), z)
         yield marker
 
 
@@ -112,10 +112,10 @@ def _lane_lines(network: LaneletNetwork) -> Iterator[Marker]:
         for aside, dashed in lines:
             segments[paint] += line_segments(points, aside, dashed)
     for number, paint in enumerate(PAINTS):
-        marker = style.blank(style.map_header(), 'lane_lines', number, Marker.LINE_LIST,
-                             style.colour(paint.colour), (paint.width, 0.0, 0.0))
+        marker = bodies.blank(bodies.map_header(), 'lane_lines', number, Marker.LINE_LIST,
+                             bodies.colour(paint.colour), (paint.width, 0.0, 0.0))
         if segments[paint]:
-            marker.points = style.points(np.concatenate(segments[paint]).tolist(), paint.z)
+            marker.points = bodies.points(np.concatenate(segments[paint]).tolist(), paint.z)
         yield marker
 
 
@@ -168,25 +168,25 @@ def _pairs(places: FloatArray) -> FloatArray:
 
 
 def _stop_lines(network: LaneletNetwork) -> Iterator[Marker]:
-    marker = style.blank(style.map_header(), 'stop_lines', 0, Marker.LINE_LIST,
-                         style.colour(style.WHITE), (STOP_LINE_WIDTH, 0.0, 0.0))
+    marker = bodies.blank(bodies.map_header(), 'stop_lines', 0, Marker.LINE_LIST,
+                         bodies.colour(bodies.WHITE), (STOP_LINE_WIDTH, 0.0, 0.0))
     ends = [stop_line_ends(lanelet) for lanelet in network.lanelets
             if lanelet.stop_line is not None]
     if ends:
-        marker.points = style.points(np.concatenate(ends).tolist(), LINE_Z)
+        marker.points = bodies.points(np.concatenate(ends).tolist(), LINE_Z)
     yield marker
 
 
 def _goals(problems: Sequence[PlanningProblem]) -> Iterator[Marker]:
     for number, problem in enumerate(problems):
-        marker = style.blank(style.map_header(), 'goals', number, Marker.LINE_LIST,
-                             style.colour(style.SKY_BLUE, 0.8), (0.25, 0.0, 0.0))
+        marker = bodies.blank(bodies.map_header(), 'goals', number, Marker.LINE_LIST,
+                             bodies.colour(bodies.SKY_BLUE, 0.8), (0.25, 0.0, 0.0))
         for state in problem.goal.state_list:
             shape = getattr(state, 'position', None)
             if shape is not None:
                 group = shape if isinstance(shape, ShapeGroup) else ShapeGroup([shape])
                 marker.points += [point for ring in _rings(group_outline(group))
-                                  for point in style.points(_pairs(ring).tolist(), GOAL_Z)]
+                                  for point in bodies.points(_pairs(ring).tolist(), GOAL_Z)]
         yield marker
 
 

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.messages.joint_messages import MAP
+from crgame_ros.messages.joints import MAP
 from crgame_ros.nodes.sim.entities import bounds, category, Entities, Region, tags
 from crgame_ros.nodes.sim.name_pattern import NamePattern
 from crgame_ros.ros.messages import set_time

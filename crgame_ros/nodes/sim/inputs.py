@@ -10,12 +10,11 @@ from typing import Any, TYPE_CHECKING
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import SeatOccupant
 from crgame_ros.game.task_documents import TASK_REPORT, TaskReport
-from crgame_ros.messages.joint_messages import from_joint_trajectory
-from crgame_ros.messages.joints import JointSeries
+from crgame_ros.messages.joints import from_joint_trajectory, JointSeries
 from crgame_ros.messages.request_layout import request_head
 from crgame_ros.messages.status_values import read_status, status_truth
 from crgame_ros.planner.registry import EXTERNAL
-from crgame_ros.ros.complaints import complain
+from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import Endpoints, SHARED_DEPTH
 from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.one_planner import OnePlanner

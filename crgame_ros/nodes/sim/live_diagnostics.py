@@ -9,7 +9,7 @@ from functools import partial
 from crgame_ros.messages.status_values import Status, WARN
 from crgame_ros.nodes.sim.inputs import SimInputs
 from crgame_ros.nodes.sim.outputs import SimOutputs
-from crgame_ros.ros.seat import Seat
+from crgame_ros.ros.seats import Seat
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.engine import Simulation
 from crgame_ros.simulation.plan_status import plans_status, refusal_status

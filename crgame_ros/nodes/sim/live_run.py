@@ -17,8 +17,8 @@ from crgame_ros.nodes.sim.remote_traffic import RemoteTraffic
 from crgame_ros.nodes.sim.run_state import Outcome, RunState
 from crgame_ros.nodes.sim.start_gate import ReadyGate, StartGate
 from crgame_ros.nodes.sim.step_watch import StepWatch
-from crgame_ros.planner.failure_lines import FailureLines
-from crgame_ros.ros.complaints import complain
+from crgame_ros.planner.manager import FailureLines
+from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.heard_topics import HeardTopics
 from crgame_ros.ros.node_main import StopFlag

@@ -11,9 +11,9 @@ from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.game.task_documents import TASK_LOG, TASK_STATE, TaskLog, TaskState
 from crgame_ros.messages.contract import load_contract
-from crgame_ros.messages.joint_messages import MAP
 from crgame_ros.messages.joints import (
     JointSeries,
+    MAP,
     object_joint_names,
     vehicle_joint_names,
     vehicle_to_joints,

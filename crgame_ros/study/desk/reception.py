@@ -9,9 +9,9 @@ import logging
 
 from aiohttp import hdrs, web
 from crgame_ros.cockpit.access import Access
-from crgame_ros.cockpit.doorkeeper import Doorkeeper
 from crgame_ros.cockpit.request_guard import (
     ACCESS,
+    Doorkeeper,
     file_answer,
     guard,
     header_writer,

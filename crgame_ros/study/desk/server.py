@@ -16,17 +16,17 @@ from aiohttp import hdrs, web, WSCloseCode, WSMsgType
 from aiohttp.typedefs import Handler
 from crgame_ros.cockpit.access import Access, cookie_name, is_loopback
 from crgame_ros.cockpit.client import Client, TokenBucket
-from crgame_ros.cockpit.doorkeeper import Doorkeeper
-from crgame_ros.cockpit.invitations import Invitations
 from crgame_ros.cockpit.page_files import PageFile, read_files
 from crgame_ros.cockpit.request_guard import (
     ACCESS,
     COOKIE_S,
+    Doorkeeper,
     file_answer,
     guard,
     header_writer,
     KEEPER,
 )
+from crgame_ros.cockpit.rights import Invitations
 from crgame_ros.cockpit.server import listen
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.paths import page_directory

@@ -11,7 +11,7 @@ from typing import Any
 
 from crgame_ros.analysis.behaviour.driver import DriverBehaviour, measure_behaviour
 from crgame_ros.analysis.behaviour.measures import MEASURES
-from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.game.file import load_game
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.rigid_transform import RigidTransform
