@@ -44,7 +44,7 @@ from commonroad.scenario.traffic_sign import (
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.traffic.fleet.adoption import Adopted
 from crgame_ros.traffic.fleet.world_view import WorldView
 from crgame_ros.traffic.spawning import CAR

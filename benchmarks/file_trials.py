@@ -19,7 +19,7 @@ from crgame_ros.analysis.outcome_line import NO_PLANS
 from crgame_ros.driver.device_map import load_device_map
 from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import config_directory, scenarios_directory
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories

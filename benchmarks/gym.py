@@ -23,8 +23,7 @@ import time
 from typing import Any
 import venv
 
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import Game
+from crgame_ros.game.game import Game, load_game
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.gym.driving_env import DrivingEnv
 from crgame_ros.gym.games_together import GamesTogether

@@ -33,7 +33,7 @@ from crgame_ros.simulation.offline import observed_run, run_offline
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
-from crgame_ros.vehicle.kinematic_single_track import integrate
+from crgame_ros.vehicle.models import integrate
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.state import VehicleState
 

@@ -25,7 +25,7 @@ from crgame_ros.messages.plan import Plan
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.writer import BagWriter
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.timing.cycle_rows import CycleRows
 from crgame_ros.timing.time_controller import Cycle

@@ -112,7 +112,7 @@ def _offline(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories')
     from crgame_ros.launcher.arguments import RunRequest
     from crgame_ros.launcher.run_plan import effective_setup
     from crgame_ros.recording.export import write_scenario
-    from crgame_ros.recording.recorded_states import recorded_states
+    from crgame_ros.recording.run_points import recorded_states
     setups = {name: effective_setup(RunRequest(driver=f'replay:{bag}', planners=(name,)))
               for name in values.planner}
     traces = recorded_states(bag) if values.human == 'trajectory' else None

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.game.file import parse_game
+from crgame_ros.game.game import parse_game
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import StateColumn

@@ -5,7 +5,7 @@
 from pathlib import Path
 
 from crgame_ros.cli import main
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.setup import build_setup
 import pytest

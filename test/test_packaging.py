@@ -161,7 +161,7 @@ def test_only_traffic_waits_for_the_compiler() -> None:
 import sys
 from importlib import import_module
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 for name in {others}:

@@ -42,7 +42,7 @@ print(json.dumps([verdicts, car.width]))
 """
 RUN = """
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 

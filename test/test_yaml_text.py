@@ -11,7 +11,7 @@ from typing import Any
 from crgame_ros.driver.device_map import load_device_map
 from crgame_ros.driver.timeline import read_timeline
 from crgame_ros.errors import InputError, LONGEST
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.occupancy.map_file import read_map_file
 from crgame_ros.recording.metadata import read_metadata
 from crgame_ros.vehicle.control_settings import load_control_settings

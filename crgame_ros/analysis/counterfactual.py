@@ -13,14 +13,13 @@ from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.driver.source import IdleDriver
 from crgame_ros.errors import InputError
-from crgame_ros.recording.offline_outcome import offline_outcome
-from crgame_ros.recording.plan_outcome import plans_of_report
 from crgame_ros.recording.progress import Progress
-from crgame_ros.recording.recorded_inputs import recorded_inputs, RecordedInputs
+from crgame_ros.recording.recorded_game import recorded_inputs, RecordedInputs
+from crgame_ros.recording.recorded_plans import plans_of_report
 from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.recording.run_record import read_run_record, run_record_of, RunRecord
 from crgame_ros.recording.run_trajectories import RunTrajectories
-from crgame_ros.recording.timing_report import timing_report
+from crgame_ros.recording.timing_report import offline_outcome, timing_report
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import Setup
 import numpy as np

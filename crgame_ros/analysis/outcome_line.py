@@ -7,7 +7,7 @@ from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
 from crgame_ros.analysis.scores.vehicle import VehicleScores
-from crgame_ros.recording.plan_outcome import plans_of_report
+from crgame_ros.recording.recorded_plans import plans_of_report
 from crgame_ros.timing.metrics import slowness
 
 # Exit code of a run in which no plan of some planner was driven.

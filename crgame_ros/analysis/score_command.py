@@ -86,7 +86,7 @@ def _score_run(values: argparse.Namespace) -> 'list[PlannerScores]':
     from crgame_ros.analysis.scores.scored_drives import expert_of_run
     from crgame_ros.analysis.scores.scored_run import score_run
     from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
-    from crgame_ros.recording.plan_outcome import plans_of_report
+    from crgame_ros.recording.recorded_plans import plans_of_report
     from crgame_ros.recording.run_folder import recording_in
     from crgame_ros.recording.run_record import read_run_record
     from crgame_ros.recording.run_trajectories import read_trajectories

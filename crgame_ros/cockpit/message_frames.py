@@ -14,8 +14,7 @@ from crgame_ros.analysis.criticality.rows import (
 )
 from crgame_ros.cockpit import frames
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import GameDocument
-from crgame_ros.game.driven_vehicle import DrivenAv
+from crgame_ros.game.documents import DrivenAv, GameDocument
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.messages.cdr import stamp_of

@@ -15,13 +15,12 @@ from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import AvSpec, Game, HumanSpec
+from crgame_ros.game.game import AvSpec, Game, HumanSpec, load_game
 from crgame_ros.planner.registry import PLANNERS
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
 from crgame_ros.schema.model_options import options_of
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.yaml_text import parse_yaml
 

@@ -13,19 +13,17 @@ from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking
 from commonroad.scenario.traffic_light import TrafficLight
 from commonroad.scenario.traffic_sign import TrafficSign
-from crgame_ros.game.documents import document_entry, GameDocument
-from crgame_ros.game.driven_vehicle import DrivenVehicle
+from crgame_ros.game.documents import document_entry, DrivenVehicle, GameDocument
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.task_spec import answer_key, TaskSpec
 from crgame_ros.geometry.shape import Shape
+from crgame_ros.roads.boundary import lanelet_areas
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signs import stop_line_ends
-from crgame_ros.roads.surface import lanelet_areas
 from crgame_ros.scenario.exact_values import group_outline
-from crgame_ros.scenario.heights import LaneletHeights
 from crgame_ros.scenario.light_and_air import environment_of
-from crgame_ros.scenario.loading import LoadedScenario
+from crgame_ros.scenario.loading import LaneletHeights, LoadedScenario
 from crgame_ros.vehicle.driver_place import driver_place
 import numpy as np
 from numpy.typing import NDArray

@@ -53,7 +53,7 @@ from crgame_ros.cockpit.request_guard import (
 )
 from crgame_ros.cockpit.rights import ROLES
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.driven_vehicle import VEHICLE_ID
+from crgame_ros.game.documents import VEHICLE_ID
 
 MESSAGES_PER_S = 400.0
 MESSAGE_BURST = 800.0

@@ -16,11 +16,10 @@ from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_scene import INPUTS
 from crgame_ros.evaluation.content import resolved
 from crgame_ros.evaluation.results.cell_rows import outcome_of, vehicle_rows
-from crgame_ros.game.file import parse_game
-from crgame_ros.game.game import Game
+from crgame_ros.game.game import Game, parse_game
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.recording.recorded_inputs import RecordedInputs
+from crgame_ros.recording.recorded_game import RecordedInputs
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.av_assignment import adapt_game, OWN

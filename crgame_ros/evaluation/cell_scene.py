@@ -15,13 +15,14 @@ from crgame_ros.driver.source import parse_source
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.content import Content, ContentStore
 from crgame_ros.evaluation.source_digest import code_neighbours, MOST_BYTES, planner_digest
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import Game
+from crgame_ros.game.game import Game, load_game
 from crgame_ros.game.variation_spec import Dimension, EXPECT, VARY
 from crgame_ros.occupancy.map_file import read_map_file
-from crgame_ros.recording.recorded_events import read_run_events
-from crgame_ros.recording.recorded_game import read_recorded_game
-from crgame_ros.recording.recorded_inputs import with_recorded_events
+from crgame_ros.recording.recorded_game import (
+    read_recorded_game,
+    read_run_events,
+    with_recorded_events,
+)
 from crgame_ros.recording.run_cycles import replay_inputs, ReplayInputs
 from crgame_ros.recording.run_folder import folder_name, participant_folder, recording_in
 from crgame_ros.scenario import guard

@@ -11,29 +11,36 @@ from dataclasses import dataclass, field
 from functools import cached_property
 import math
 from pathlib import Path
-from typing import Annotated, Any
+import re
+from typing import Annotated, Any, Literal
 
-from annotated_types import Interval
+from annotated_types import Interval, Predicate
 from crgame_ros.errors import InputError
-from crgame_ros.game.driven_vehicle import DrivenAv, DrivenHuman, DrivenVehicle
 from crgame_ros.game.events import EventList, EventSpec, FiredEvent
 from crgame_ros.game.game import (
+    AvSpec,
     DrivabilitySpec,
     EnvironmentSpec,
     MAX_VEHICLES,
+    ModelSpec,
     PredictionSpec,
     TimingSpec,
+    TrackerSpec,
 )
 from crgame_ros.game.instruments_spec import InstrumentsSpec
 from crgame_ros.game.object_spec import ObjectList, ObjectSpec
 from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.game.task_spec import TaskList, TaskSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.schema.document_marks import Bounded, Declared, Derived
+from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.schema.document_marks import Bounded, Declared, Derived, Row
 from crgame_ros.schema.json_documents import JsonDocument
 from crgame_ros.schema.writing import write
 from crgame_ros.vehicle.lights import ALL_LIGHTS
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
 
 # Keys of every event; the others are parameters of its kind.
 _COMMON = ('name', 'label', 'kind', 'when')
@@ -42,6 +49,59 @@ _LARGEST = 2**31 * 10**9
 Count = Annotated[int, Interval(ge=0, lt=_LARGEST)]
 Period = Annotated[int, Interval(ge=1, lt=_LARGEST)]
 Amount = Annotated[float, Interval(ge=0.0, lt=math.inf)]
+VEHICLE_ID = re.compile(r'(hv|av)[0-9]{1,3}')
+VehicleId = Annotated[str, Predicate(VEHICLE_ID.fullmatch)]
+
+
+@dataclass(frozen=True)
+class DrivenVehicle:
+    """
+    The common fields of humans' vehicles and AVs.
+
+    :param id: hv0, av0, …
+    :param vehicle: its parameters.
+    :param state: initial state of the rear axle, in frame map.
+    """
+
+    id: VehicleId  # noqa: A003
+    vehicle: VehicleParameters
+    state: Annotated[VehicleState, Row()]
+
+
+@dataclass(frozen=True)
+class DrivenHuman(DrivenVehicle):
+    """
+    A human's vehicle.
+
+    :param driver: source of its commands, as in a game file.
+    :param timeline: text of the timeline that it plays, empty without one.
+    :param dynamics: the model that moves it; None is the KS model of CRG 2-4.
+    """
+
+    driver: str
+    timeline: str = ''
+    dynamics: Annotated[ModelSpec, Declared()] | None = None
+
+
+@dataclass(frozen=True)
+class DrivenAv(DrivenVehicle):
+    """
+    An AV; what is not described here is as in a game file.
+
+    :param options: of the planner.
+    :param planning_problem: id of its planning problem.
+    :param transform: from simulation to the scenario coordinates in which it plans (CRG 9).
+    :param perception: how it perceives the world; None is perfectly.
+    """
+
+    planner: str
+    options: dict[str, object] = field(default_factory=dict)
+    planning_problem: int = 0
+    transform: Annotated[RigidTransform, Row()] = RigidTransform()
+    execution: Literal['perfect', 'tracked'] = AvSpec.execution
+    tracker: Annotated[TrackerSpec, Declared()] = AvSpec.tracker
+    dynamics: Annotated[ModelSpec, Declared()] = AvSpec.dynamics
+    perception: Annotated[PerceptionSpec, Declared()] | None = None
 
 
 def document_entry(event: EventSpec) -> dict[str, object]:

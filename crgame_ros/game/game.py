@@ -30,8 +30,10 @@ from crgame_ros.schema.marks import (
     Within,
     Wording,
 )
+from crgame_ros.schema.reading import read
 from crgame_ros.schema.writing import write
 from crgame_ros.vehicle.parameters import AUTO
+from crgame_ros.yaml_text import read_yaml
 
 Light = Literal['day', 'dusk']
 # Visibility on a clear day [m].
@@ -379,3 +381,24 @@ class Game:
         count = len(self.humans) + len(self.avs or ())
         if count > MAX_VEHICLES:
             raise InputError(f'{count} humans and AVs', '', f'have {MAX_VEHICLES} at most')
+
+
+def load_game(path: Path) -> Game:
+    """
+    Read a game file.
+
+    :raises InputError: naming the file, the key and the remedy.
+    """
+    values = read_yaml(path, 'game file')
+    return parse_game(values, str(path), path.parent)
+
+
+def parse_game(values: object, where: str, base: Path) -> Game:
+    """
+    Check the content of a game file.
+
+    :param values: the parsed YAML.
+    :param where: file name for messages.
+    :param base: directory against which its file names are resolved.
+    """
+    return read(Game, values, where, base)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from annotated_types import Len, Predicate
-from crgame_ros.game.driven_vehicle import VehicleId
+from crgame_ros.game.documents import VehicleId
 from crgame_ros.game.game import MAX_VEHICLES
 from crgame_ros.schema.document_marks import Bounded, Exact
 from crgame_ros.schema.json_documents import JsonDocument

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from annotated_types import Interval, Len
-from crgame_ros.game.driven_vehicle import VehicleId
+from crgame_ros.game.documents import VehicleId
 from crgame_ros.game.task_spec import TaskKind
 from crgame_ros.schema.document_marks import Bounded, Exact
 from crgame_ros.schema.json_documents import JsonDocument

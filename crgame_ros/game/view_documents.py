@@ -7,7 +7,7 @@ import re
 from typing import Annotated, Literal, NamedTuple
 
 from annotated_types import Interval, Predicate
-from crgame_ros.game.driven_vehicle import VehicleId
+from crgame_ros.game.documents import VehicleId
 from crgame_ros.game.task_documents import Milliseconds, SteadySeconds
 from crgame_ros.schema.document_marks import Bounded, Exact
 from crgame_ros.schema.json_documents import JsonDocument

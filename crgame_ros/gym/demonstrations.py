@@ -17,9 +17,9 @@ from crgame_ros.paths import extra_install
 from crgame_ros.policy.observation import Observed
 from crgame_ros.policy.observation_spec import ObservationSpec
 from crgame_ros.recording.recorded_game import read_recorded_game
-from crgame_ros.recording.recorded_states import recorded_states
 from crgame_ros.recording.run_cycles import replay_inputs
 from crgame_ros.recording.run_folder import recording_in, run_name
+from crgame_ros.recording.run_points import recorded_states
 from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.engine import StepResult

@@ -9,10 +9,10 @@ from crgame_ros.drivability.collision import CIRCLE_SLACK, PERMANENT_OBSTACLE, P
 from crgame_ros.drivability.monitor import road_transforms
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
-from crgame_ros.game.driven_vehicle import DrivenHuman
+from crgame_ros.game.documents import DrivenHuman
 from crgame_ros.game.objects import ObjectStates
-from crgame_ros.geometry.outline import Footprint, Primitive
 from crgame_ros.geometry.reference_point import shifted
+from crgame_ros.geometry.shape import Footprint, Primitive
 from crgame_ros.gym.av_pilot import AvPilot, stacked
 from crgame_ros.gym.episode_options import Start
 from crgame_ros.gym.episode_setups import EpisodeSetups

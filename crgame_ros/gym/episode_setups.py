@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, TypeVar
 
 from crgame_ros.drivability.monitor import road_transforms
 from crgame_ros.errors import InputError
-from crgame_ros.game.driven_vehicle import DrivenHuman
+from crgame_ros.game.documents import DrivenHuman
 from crgame_ros.game.game import Game
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.gym.episode_options import Start

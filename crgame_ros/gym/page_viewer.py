@@ -27,7 +27,7 @@ from crgame_ros.errors import CrgameError
 from crgame_ros.gym.av_pilot import stacked
 from crgame_ros.gym.driving_game import DrivingGame
 from crgame_ros.messages.status_values import Status
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from crgame_ros.vehicle.state import StateColumn

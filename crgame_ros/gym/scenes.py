@@ -9,8 +9,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import Game, HumanSpec
+from crgame_ros.game.game import Game, HumanSpec, load_game
 from crgame_ros.gym.episode_options import game_at
 from crgame_ros.gym.episode_setups import EpisodeSetups, StartVariation
 from crgame_ros.library.lookup import find_scenario

@@ -16,16 +16,15 @@ from crgame_ros.cockpit.exposure import check_certificate
 from crgame_ros.driver.source import COCKPIT, parse_source
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import PlannerSwap
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import AvSpec, Game, HumanSpec, TimingSpec
+from crgame_ros.game.game import AvSpec, Game, HumanSpec, load_game, TimingSpec
 from crgame_ros.instruments.extra import require_instruments
 from crgame_ros.launcher.arguments import cockpit_host, RunRequest
 from crgame_ros.library.stored_index import is_kept
 from crgame_ros.paths import check_room, default_game, numbered
 from crgame_ros.planner.registry import create_planner, EXTERNAL
 from crgame_ros.policy.policy_file import load_policy
-from crgame_ros.recording.recorded_game import read_recorded_game
-from crgame_ros.recording.recorded_inputs import (
+from crgame_ros.recording.recorded_game import (
+    read_recorded_game,
     recorded_inputs,
     replay_notices,
     with_replayed_events,
@@ -33,9 +32,9 @@ from crgame_ros.recording.recorded_inputs import (
 from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.registry import POLICY
 from crgame_ros.scenario import guard
-from crgame_ros.scenario.recorded_humans import plays_its_humans
+from crgame_ros.scenario.loading import plays_its_humans
 from crgame_ros.schema.reading import read
-from crgame_ros.simulation.event_check import check_swap
+from crgame_ros.simulation.game_check import check_swap
 from crgame_ros.simulation.setup import build_setup, Setup
 
 CLAIM = '.started'

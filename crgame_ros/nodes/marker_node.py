@@ -8,8 +8,7 @@ import math
 import time
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.documents import SIGNALS, Signals
-from crgame_ros.game.driven_vehicle import DrivenAv
+from crgame_ros.game.documents import DrivenAv, SIGNALS, Signals
 from crgame_ros.messages.contract import load_contract
 from crgame_ros.messages.joints import from_joint_trajectory, MAP
 from crgame_ros.messages.world_messages import WorldMessages

@@ -14,11 +14,10 @@ from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.contract import load_contract, Topic
 from crgame_ros.paths import numbered
 from crgame_ros.recording.exceptions import RecordingError
-from crgame_ros.recording.log_clock import LogClock
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import next_part, run_folder
-from crgame_ros.recording.writer import BagWriter
+from crgame_ros.recording.writer import BagWriter, LogClock
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription, relative
 from crgame_ros.ros.heard_topics import OFFSET, RECORDED
 from crgame_ros.ros.node_main import run_node, StopFlag

@@ -28,7 +28,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 if TYPE_CHECKING:
-    from crgame_ros.recording.recorded_inputs import RecordedInputs
+    from crgame_ros.recording.recorded_game import RecordedInputs
 
 NS_PER_S = 1_000_000_000
 # /clock starts here: ROS takes a time of zero for "no clock yet".
@@ -141,7 +141,7 @@ class SimNode(Node):
         """Read the recordings to be repeated before the run, because its loop opens no file."""
         if not any(is_replay(human.driver) for human in setup.humans):
             return None
-        from crgame_ros.recording.recorded_inputs import recorded_inputs
+        from crgame_ros.recording.recorded_game import recorded_inputs
         return recorded_inputs(setup)
 
     def _write_roster(self, setup: Setup) -> None:

@@ -12,7 +12,7 @@ from crgame_ros.game.objects import ObjectStates, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.messages.joints import object_joint_names
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.ros.endpoints import Endpoints, NodeReport
 from crgame_ros.ros.messages import StateMessage
 from crgame_ros.ros.node_main import run_node, StopFlag
@@ -21,9 +21,8 @@ from crgame_ros.ros.spinning import poll
 from crgame_ros.ros.trusted_code import TrustedCode
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
 from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.simulation.traffic_setup import make_traffic
+from crgame_ros.simulation.traffic_setup import make_traffic, WorldReader
 from crgame_ros.simulation.world import TrafficOrders
-from crgame_ros.simulation.world_reader import WorldReader
 from crgame_ros.traffic.compiling.kernel_cache import compile_now
 from crgame_ros.traffic.fleet.world_view import WorldView
 from crgame_ros.traffic.traffic import Traffic

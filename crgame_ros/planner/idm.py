@@ -20,13 +20,14 @@ from crgame_ros.planner.reference_path import (
     DrivingPath,
 )
 from crgame_ros.planner.side_lanes import has_gap, LaneChange, OWN_LANE, SideLane, Verdict
-from crgame_ros.roads.signals import RED_STATES, TrafficLights
 from crgame_ros.roads.signs import (
     has_stop_sign,
     lights_for,
     lights_of,
+    RED_STATES,
     SIGN_REACH,
     stop_line_middle,
+    TrafficLights,
 )
 from crgame_ros.vehicle.idm_model import free_acceleration, IdmParameters, interaction
 from crgame_ros.vehicle.parameters import VehicleParameters

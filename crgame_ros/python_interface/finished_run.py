@@ -12,7 +12,7 @@ import warnings
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.analysis.runs.run import Run as MeasuredRun
 from crgame_ros.python_interface.games import as_path, FileName
-from crgame_ros.recording.recorded_inputs import RecordedInputs
+from crgame_ros.recording.recorded_game import RecordedInputs
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray

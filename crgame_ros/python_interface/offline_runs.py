@@ -30,7 +30,7 @@ from crgame_ros.recording.offline_recording import (
     write_recording,
 )
 from crgame_ros.recording.progress import Progress
-from crgame_ros.recording.recorded_inputs import (
+from crgame_ros.recording.recorded_game import (
     inputs_of,
     recorded_inputs,
     RecordedInputs,

@@ -23,9 +23,9 @@ from crgame_ros.python_interface.games import (
 from crgame_ros.python_interface.offline_runs import OfflineRun
 from crgame_ros.recording.conversion import convert_log, day_of, write_openscenario
 from crgame_ros.recording.recorded_game import read_game_document
-from crgame_ros.recording.recorded_states import recorded_states
 from crgame_ros.recording.run_folder import recording_in, run_name
 from crgame_ros.recording.run_formats import OPENSCENARIO
+from crgame_ros.recording.run_points import recorded_states
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
 from crgame_ros.simulation.setup import Setup
 import numpy as np

@@ -26,13 +26,23 @@ from crgame_ros.recording.run_formats import (
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.exact_values import exact_value
-from crgame_ros.scenario.export_document import NO_DAY, scenario_document, scenario_header
-from crgame_ros.scenario.export_elements import goal_state, planning_problem
+from crgame_ros.scenario.export_document import (
+    goal_state,
+    NO_DAY,
+    planning_problem,
+    scenario_document,
+    scenario_header,
+)
 from crgame_ros.scenario.export_goals import goal_where_it_ended, goals_of
 from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.export_network import used_ids, write_roads
-from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
-from crgame_ros.scenario.recorded_humans import human_note, SOURCE_MARK, without_human_notes
+from crgame_ros.scenario.loading import (
+    human_note,
+    LoadedScenario,
+    parse_scenario,
+    SOURCE_MARK,
+    without_human_notes,
+)
 from crgame_ros.whole_file import write_text
 import numpy as np
 from numpy.typing import NDArray

@@ -14,7 +14,7 @@ from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.reference_point import seen_from, shifted
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.recording.run_trajectories import RunTrajectories
-from crgame_ros.scenario.export_elements import (
+from crgame_ros.scenario.export_document import (
     dynamic_obstacle,
     DYNAMIC_TYPES,
     environment_obstacle,
@@ -26,7 +26,7 @@ from crgame_ros.scenario.export_elements import (
     whole,
 )
 from crgame_ros.scenario.export_ids import IdPool
-from crgame_ros.scenario.recorded_signals import recorded_signals
+from crgame_ros.scenario.obstacles import recorded_signals
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from crgame_ros.vehicle.lights import BRAKING, HAZARD, Light
 from crgame_ros.vehicle.state import StateColumn

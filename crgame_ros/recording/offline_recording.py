@@ -33,7 +33,7 @@ from crgame_ros.recording.standard_messages import (
 )
 from crgame_ros.recording.writer import BagWriter
 from crgame_ros.simulation.offline import OfflineResult
-from crgame_ros.simulation.plan_status import stop_reason, stop_status
+from crgame_ros.simulation.run_messages import stop_reason, stop_status
 from crgame_ros.simulation.run_texts import document_texts, state_text, state_values
 from crgame_ros.timing.cycle_rows import CycleRows, CYCLES
 from crgame_ros.timing.publishing import steps_between_messages

@@ -1,15 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Computes a run's motion at the times of its stamps.
+Computes a run's motion at the times of its stamps, over the gaps of a busy recorder.
 
 State n is stamped n dt, but vehicles driven by hand are integrated over measured intervals
 (CRG 13). Around a stall such a state is ahead of its stamp by up to the stall, and differences
 of positions disagree with speeds. All exports and measures of motion use this module.
+
+Short gaps are filled from the states around them and reported; longer ones cut the run.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
 
+from crgame_ros.game.game import TimingSpec
+from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.timing.cycle_rows import CycleTable
 from crgame_ros.vehicle.state import pose_rates
@@ -18,6 +23,15 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+# After longer gaps, positions are too uncertain: at 8 m/s^2 a vehicle is 1 m from its expected
+# position, and a lane is left after 1.5 s.
+LONGEST_GAP_S = 1.0
+# Largest acceleration of an object between two joined states [m/s^2]; a larger one means another
+# object with the same name.
+_MAX_ACCELERATION = 10.0
+_TOLD = 3
+# Tolerance for the rounding of sums of dt_eff from the rows [s].
+_ROUNDING_S = 1e-6
 
 
 def resample(states: FloatArray, ns: IntArray, intervals_s: FloatArray, dt_s: float,
@@ -120,3 +134,176 @@ def cubic(share: FloatArray, length: FloatArray, displacement: FloatArray,
     rest = 1.0 - share
     return (share * share * (3.0 - 2.0 * share) * displacement
             + share * rest * length * (rest * start_rates - share * end_rates))
+
+
+class Stretch(NamedTuple):
+    """
+    Consecutive scenario steps that a recording covers.
+
+    :param ticks: (K) their steps n.
+    :param notices: the missing parts of the run and the reasons, one line each.
+    """
+
+    ticks: IntArray
+    notices: tuple[str, ...]
+
+
+def longest_stretch(recorded: Mapping[str, IntArray], scheduler: ScenarioScheduler) -> Stretch:
+    """
+    Return the scenario steps of a run: the longest piece without a gap that cannot be filled.
+
+    :param recorded: by topic the increasing steps n that it holds; for objects only the ticks.
+    :return: without ticks if the topics have none in common.
+    """
+    per_tick, k0 = scheduler.steps_per_tick, scheduler.k0
+    pieces: list[tuple[int, int]] = [(0, int(max(ns[-1] for ns in recorded.values())))]
+    gaps: list[tuple[int, str]] = []
+    for topic, ns in recorded.items():
+        ends = _ends(ns, scheduler)
+        gaps += [(int(ns[end]), f'{topic} for {(ns[end + 1] - ns[end]) * scheduler.dt_s:.1f} s '
+                  f'after scenario step {scheduler.k(int(ns[end]))}') for end in ends]
+        whole = [(int(part[0]), int(part[-1])) for part in np.split(ns, ends + 1)]
+        pieces = [(max(a, c), min(b, d)) for a, b in pieces for c, d in whole
+                  if max(a, c) <= min(b, d)]
+    spans = [(-(-a // per_tick), b // per_tick + 1) for a, b in pieces]
+    first, end = max((span for span in spans), key=lambda span: span[1] - span[0],
+                     default=(0, 0))
+    if end <= first:
+        return Stretch(np.empty(0, dtype=np.int64), ())
+    last_seen = max(int(ns[-1]) for ns in recorded.values()) // per_tick
+    return Stretch(per_tick * np.arange(first, end), tuple(
+        _describe_gaps(gaps, k0 + first, k0 + end - 1, k0 + last_seen, k0)))
+
+
+def farthest(scheduler: ScenarioScheduler) -> int:
+    """Return the largest distance in steps n between two states that are joined."""
+    return scheduler.steps_for(LONGEST_GAP_S) + scheduler.steps_per_tick
+
+
+def _ends(ns: IntArray, scheduler: ScenarioScheduler) -> IntArray:
+    """Find the indices in increasing steps after which a gap is too long to fill."""
+    return np.flatnonzero(np.diff(ns) > farthest(scheduler))
+
+
+def piece_around(ns: IntArray, n: int, scheduler: ScenarioScheduler) -> IntArray:
+    """Return the steps of the piece that contains step n, without a gap."""
+    pieces = np.split(ns, _ends(ns, scheduler) + 1)
+    return next(piece for piece in pieces if n <= piece[-1])
+
+
+def _describe_gaps(gaps: Sequence[tuple[int, str]], first: int, last: int, last_seen: int,
+                   k0: int) -> list[str]:
+    """Return notices on the scenario steps of a stretch, if some are missing."""
+    if gaps:
+        texts = [text for _, text in sorted(gaps)]
+        more = f' and {len(texts) - _TOLD} times more' if len(texts) > _TOLD else ''
+        return [f'nothing was recorded of {", of ".join(texts[:_TOLD])}{more}, and up to '
+                f'{LONGEST_GAP_S:g} s are bridged: the run is its longest piece, scenario steps '
+                f'{first} to {last} of {k0} to {last_seen}']
+    told = []
+    if first > k0:
+        told.append(f'the recording begins at scenario step {first} of a run that began at {k0}')
+    if last_seen > last + 1:
+        told.append(f'scenario step {last + 1} was not recorded: the run is taken up to {last} '
+                    f'of {last_seen}')
+    return told
+
+
+def bridge_objects(ticks: IntArray, points: Mapping[int, FloatArray], dt_s: float,
+                   joints: int) -> FloatArray:
+    """
+    Return the points of all objects at ticks; fill missing ones from those around them.
+
+    Poses are cubic by the velocities at both ends, velocities linear. An object that is absent at
+    one end, or differs between the ends, is absent in between.
+
+    :param ticks: (K) steps n, none of them before the first recorded one or after the last.
+    :param points: recorded points (3, joints) by step n.
+    :return: (K, 2, joints) poses and velocities.
+    """
+    found = np.empty((len(ticks), 2, joints))
+    known = np.isin(ticks, list(points))
+    for row in np.flatnonzero(known):
+        found[row] = points[int(ticks[row])][:2]
+    recorded = np.array(sorted(points))
+    for row in np.flatnonzero(~known):
+        after = int(np.searchsorted(recorded, ticks[row]))
+        first, second = int(recorded[after - 1]), int(recorded[after])
+        found[row] = _between(points[first], points[second],
+                              float(ticks[row] - first) * dt_s, float(second - first) * dt_s)
+    return found
+
+
+def _between(first: FloatArray, second: FloatArray, time_s: float,
+             length_s: float) -> FloatArray:
+    """Interpolate between two points (3, joints): poses and velocities (2, joints)."""
+    share, length = np.array([[time_s / length_s]]), np.array([[length_s]])
+    ahead = second[0] - first[0]
+    ahead[2::3] = wrap_pi_array(ahead[2::3])
+    poses = first[0] + cubic(share, length, ahead, first[1], second[1])[0]
+    poses[2::3] = wrap_pi_array(poses[2::3])
+    found = np.stack((poses, first[1] + share[0] * (second[1] - first[1])))
+    fastest = np.maximum(*(np.hypot(row[0::3], row[1::3]) for row in (first[1], second[1])))
+    reach = (fastest + 0.5 * _MAX_ACCELERATION * length_s) * length_s
+    # NaN counts as another object too.
+    other = ~(np.hypot(ahead[0::3], ahead[1::3]) <= reach)
+    found[:, np.repeat(other, 3)] = np.nan
+    return found
+
+
+def bridged_notice(topic: str, ticks: IntArray, recorded: IntArray,
+                   scheduler: ScenarioScheduler) -> tuple[str, ...]:
+    """
+    Return at most one line that names the scenario steps missing in a topic.
+
+    :param ticks: (K) the run's steps n.
+    :param recorded: increasing steps n that the topic holds.
+    """
+    missing = ticks[~np.isin(ticks, recorded)]
+    if not len(missing):
+        return ()
+    after = np.searchsorted(recorded, missing)
+    longest_s = float(np.max(recorded[after] - recorded[after - 1])) * scheduler.dt_s
+    ks = ', '.join(str(scheduler.k(int(n))) for n in missing[:_TOLD])
+    return (f'{len(missing)} scenario steps of {topic} were not recorded ({ks}'
+            f'{", …" if len(missing) > _TOLD else ""}): interpolated between states that are at '
+            f'most {longest_s:.2f} s apart',)
+
+
+def lost_intervals(table: CycleTable, timing: TimingSpec, dt_s: float,
+                   last_n: int) -> FloatArray | None:
+    """
+    Compute the intervals of the cycles that were not recorded, from the lag of the others.
+
+    The sum of the intervals is ahead of n dt by the lag E_n (CRG 12), less the part that the clip
+    has cut off and not yet returned. That part is zero after every interval that was not clipped.
+    So the sum of the missing intervals between two such cycles is known; each gets an equal share.
+
+    :return: (last_n + 1) intervals [s], nominal after the last cycle; None where intervals do not
+        follow the lag, as in a run that was repeated from a recording.
+    """
+    if timing.clip != 'carry' or not timing.measured_interval:
+        return None
+    # The run begins without a lag.
+    ns = np.concatenate(([0], table.column('n').astype(np.int64)))
+    lags_s = np.concatenate(([0.0], table.column('cumulative_error_s')))
+    moved_s = np.concatenate(([dt_s], table.column('dt_eff_s')))
+    free = (moved_s > min(timing.dt_min, 0.5 * dt_s)) \
+        & (moved_s < max(timing.dt_max, 2.0 * dt_s))
+    pairs = free[1:] & free[:-1] & (np.diff(ns) == 1)
+    misfits_s = np.abs(moved_s[1:] - dt_s - np.diff(lags_s))[pairs]
+    if not len(misfits_s) or np.median(misfits_s) > _ROUNDING_S:
+        return None
+    found = np.full(last_n + 1, dt_s)
+    recorded = np.zeros(max(last_n, int(ns[-1])) + 1, dtype=bool)
+    recorded[ns] = True
+    sums_s = np.cumsum(moved_s)
+    anchors = np.flatnonzero(free)
+    lost = np.diff(ns[anchors]) - np.diff(anchors)
+    for gap in np.flatnonzero(lost):
+        left, right = anchors[gap], anchors[gap + 1]
+        total_s = (ns[right] - ns[left]) * dt_s + lags_s[right] - lags_s[left]
+        place = np.arange(ns[left] + 1, ns[right])
+        place = place[~recorded[place] & (place <= last_n)]
+        found[place] = max(0.0, (total_s - (sums_s[right] - sums_s[left])) / lost[gap])
+    return found

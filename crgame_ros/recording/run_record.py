@@ -11,7 +11,7 @@ import statistics
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.driven_vehicle import VEHICLE_ID
+from crgame_ros.game.documents import VEHICLE_ID
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.seat_documents import DRIVERS, DrivingSpell, ORDER
 from crgame_ros.game.task_documents import TASK_LOG, TaskEntry
@@ -20,7 +20,7 @@ from crgame_ros.messages.status_values import read_status
 from crgame_ros.messages.world_messages import VEHICLES_TOPIC
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.recorded_events import read_run_events
+from crgame_ros.recording.recorded_game import read_run_events
 from crgame_ros.recording.run_trajectories import (
     read_trajectories,
     RunTrajectories,

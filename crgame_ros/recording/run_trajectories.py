@@ -22,21 +22,22 @@ from crgame_ros.messages.world_messages import (
 )
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.exceptions import RunTooShortError
-from crgame_ros.recording.gap_filling import (
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.resampling import (
     bridge_objects,
     bridged_notice,
     farthest,
     longest_stretch,
     lost_intervals,
+    moved_intervals,
     piece_around,
+    resample,
 )
-from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.resampling import moved_intervals, resample
 from crgame_ros.recording.run_cycles import cycle_tables, table_of
 from crgame_ros.recording.run_points import read_points
 from crgame_ros.recording.standard_messages import TRAJECTORY
-from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.offline import OfflineResult
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.timing.cycle_rows import CycleTable
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np

@@ -18,15 +18,21 @@ from crgame_ros.messages.status_values import BRAKING, read_status
 from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
 from crgame_ros.planner.adapter import first_of_kind
 from crgame_ros.recording.epochs import Epoch, read_epoch
-from crgame_ros.recording.plan_outcome import PLAN_COUNTS, PlanOutcome, spread_of
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.recorded_plans import OpenRequests
+from crgame_ros.recording.recorded_plans import (
+    OpenRequests,
+    PLAN_COUNTS,
+    PlanOutcome,
+    plans_of_result,
+    spread_of,
+)
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.run_points import read_points
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.recording.storage import BagMessage
-from crgame_ros.recording.view_periods import SeatSound, ViewPeriods
-from crgame_ros.simulation.contacts import Contact, find_contacts, Motions
+from crgame_ros.recording.views import SeatSound, ViewPeriods
+from crgame_ros.simulation.contacts import Contact, contacts_of, find_contacts, Motions
+from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.timing.late_steps import LateSteps
 from crgame_ros.timing.metrics import slowness, TimingMetrics
 from crgame_ros.vehicle.state import StateColumn
@@ -320,3 +326,24 @@ class _Collector:
 def _count(values: dict[str, str], key: str) -> int | None:
     text = values.get(key, '')
     return int(text) if text.isdecimal() else None
+
+
+def offline_outcome(result: OfflineResult) -> dict[str, object]:
+    """Return the entries `planners`, `drivability` and `contacts`, as `timing_report` does."""
+    violations = _violations(result)
+    return {'planners': {av: each.as_dict() for av, each in plans_of_result(result).items()},
+            'drivability': {'violations': len(violations), 'list': violations},
+            'contacts': [item.as_dict() for item in contacts_of(result)],
+            'notices': list(result.setup.notices)}
+
+
+def _violations(result: OfflineResult) -> list[dict[str, object]]:
+    """Return the violations by their beginnings, in order."""
+    found: list[dict[str, object]] = []
+    lasting: dict[str, set[str]] = {}
+    for verdict in result.violations:
+        violated = set(verdict.faults)
+        found += [{'n': verdict.n, 'vehicle': verdict.vehicle_id, 'what': what}
+                  for what in sorted(violated - lasting.get(verdict.vehicle_id, set()))]
+        lasting[verdict.vehicle_id] = violated
+    return found

@@ -13,7 +13,7 @@ from crgame_ros.analysis.counterfactual import Alternative, drive_against, drive
 from crgame_ros.errors import CrgameError
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup
-from crgame_ros.recording.recorded_inputs import inputs_of, RecordedInputs
+from crgame_ros.recording.recorded_game import inputs_of, RecordedInputs
 from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.recording.run_trajectories import (
     read_trajectories,

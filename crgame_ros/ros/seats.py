@@ -27,7 +27,7 @@ from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 
 if TYPE_CHECKING:
     from crgame_ros.driver.source import ReplayDriver
-    from crgame_ros.recording.recorded_inputs import RecordedInputs
+    from crgame_ros.recording.recorded_game import RecordedInputs
     from crgame_ros.simulation.engine import Simulation
     from crgame_ros.simulation.setup import Setup
 

@@ -1,9 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Loads CommonRoad scenarios (2017a, 2018b and 2020a) from files and from text."""
+"""
+Loads CommonRoad scenarios (2017a, 2018b and 2020a) from files and from text.
+
+An exported file has a planning problem for every driven vehicle. The attribute `source` states
+which of them a human drove, and which obstacle has the recorded drive. The schema accepts any text
+there, and commonroad-io preserves it on reading and writing, unlike comments.
+"""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -11,6 +17,7 @@ import hashlib
 import logging
 from pathlib import Path
 import pickle
+import re
 import warnings
 from xml.etree import ElementTree
 
@@ -21,16 +28,15 @@ from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.state import InitialState
 from commonroad.scenario.traffic_sign import SupportedTrafficSignCountry
 from crgame_ros.errors import InputError, one_line
-from crgame_ros.roads.surface import lanelet_ring
+from crgame_ros.roads.boundary import lanelet_ring
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.exact_values import exact_position, exact_value, uncertain_values
 from crgame_ros.scenario.format_2017a import upgrade
-from crgame_ros.scenario.heights import LaneletHeights, take_heights
-from crgame_ros.scenario.recorded_humans import read_human_note
 from crgame_ros.scenario.repair import mend, mend_places
 from crgame_ros.scenario.simplifications import simplifications, unused_elements
 from lxml import etree
 import numpy as np
+from numpy.typing import NDArray
 import shapely
 
 # Lanes are sampled along their length: one of a million kilometres would fill the memory [m].
@@ -41,6 +47,51 @@ _COUNTRIES = frozenset(country.value for country in SupportedTrafficSignCountry)
 _KEPT = 8
 # Repairing the surface of a lanelet with crossing bounds takes cubic time: 500 points took 4 s.
 _MOST_TANGLED = 200
+# Text in the source of every exported file, which identifies such files.
+SOURCE_MARK = 'driven in crgame_ros'
+_NOTE = re.compile(r' \(humans?: ([^()]*)\)')
+_HUMAN = re.compile(r'planning problem (\d{1,18}) is obstacle (\d{1,18})')
+
+
+@dataclass(frozen=True)
+class LaneletHeights:
+    """
+    Heights of a lanelet's bounds.
+
+    :param left: heights of the left bound's vertices (N) [m]
+    :param right: heights of the right bound's vertices (N) [m]
+    """
+
+    left: NDArray[np.float64]
+    right: NDArray[np.float64]
+
+
+def take_heights(root: etree._Element) -> tuple[dict[int, LaneletHeights], list[str]]:
+    """
+    Read the heights of lanelets whose vertices all have one, and remove all heights.
+
+    :param root: a scenario that passed `guard.refuse_malformed`; changed in place
+    :return: by lanelet id, and remarks, one line each
+    """
+    found = {}
+    for lanelet in root.iterchildren('lanelet'):
+        left, right = (
+            [float(text) for point in lanelet.iterfind(f'{side}/point')
+             if (text := point.findtext('z')) is not None] for side in ('leftBound', 'rightBound'))
+        count = len(lanelet.findall('leftBound/point'))
+        if left and len(left) == len(right) == count:
+            found[int(lanelet.get('id', ''))] = LaneletHeights(np.array(left), np.array(right))
+    points = [point for point in root.iter('point', 'center') if point.find('z') is not None]
+    for point in points:
+        point.remove(point.find('z'))
+    shown = sum(2 * len(heights.left) for heights in found.values())
+    notices = []
+    if shown:
+        notices.append(f'the heights of {shown} points are for the eye alone')
+    if shown < len(points):
+        notices.append(f'the heights of {len(points) - shown} points are ignored: only those of '
+                       'lanelets whose points all have one are shown')
+    return found, notices
 
 
 @dataclass(frozen=True)
@@ -216,3 +267,46 @@ def _exact_problem(problem: PlanningProblem, notices: list[str]) -> PlanningProb
         acceleration=exact_value(state.acceleration), yaw_rate=exact_value(state.yaw_rate),
         slip_angle=exact_value(state.slip_angle))
     return PlanningProblem(problem.planning_problem_id, exact, problem.goal)
+
+
+def human_note(humans: Mapping[int, int]) -> str:
+    """
+    Return the text that follows `SOURCE_MARK`; empty without humans.
+
+    :param humans: obstacle ids by planning problem.
+    """
+    if not humans:
+        return ''
+    told = ', '.join(f'planning problem {number} is obstacle {obstacle}'
+                     for number, obstacle in humans.items())
+    return f' ({"human" if len(humans) == 1 else "humans"}: {told})'
+
+
+def without_human_notes(source: str) -> str:
+    """Return a source without the notes of earlier runs, which hold for their own files only."""
+    return _NOTE.sub('', source)
+
+
+def read_human_note(source: str) -> dict[int, int]:
+    """
+    Return the humans in a note of `human_note`.
+
+    :param source: attribute of the file.
+    :return: obstacle ids by planning problem.
+    """
+    mark = source.rfind(SOURCE_MARK)
+    note = _NOTE.match(source, mark + len(SOURCE_MARK)) if mark >= 0 else None
+    return {} if note is None else {
+        int(problem): int(obstacle) for problem, obstacle in _HUMAN.findall(note[1])}
+
+
+def plays_its_humans(path: Path) -> bool:
+    """
+    Return whether a file is an exported run whose humans play back while its AVs drive.
+
+    :raises InputError: if it cannot be read.
+    """
+    root = guard.parse_hardened(guard.read_text(path), str(path))
+    humans = read_human_note(root.get('source', ''))
+    problems = {problem.get('id') for problem in root.iterchildren('planningProblem')}
+    return bool(humans) and not problems <= {str(number) for number in humans}

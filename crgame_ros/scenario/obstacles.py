@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The obstacles of a scenario: their descriptions, and their states at each time step."""
 
+from bisect import bisect_right
 from collections.abc import Collection, Iterator, Mapping, Sequence
 import copy
 from dataclasses import dataclass, replace
@@ -13,20 +14,23 @@ from commonroad.geometry.shape import Circle, Rectangle
 from commonroad.geometry.shape import Shape as CommonRoadShape
 from commonroad.prediction.prediction import SetBasedPrediction, TrajectoryPrediction
 from commonroad.scenario.obstacle import DynamicObstacle, Obstacle, PhantomObstacle
-from commonroad.scenario.state import State
+from commonroad.scenario.state import SignalState, State
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.exact_values import exact_position, exact_value, parts_of
 from crgame_ros.scenario.loading import LoadedScenario
-from crgame_ros.scenario.recorded_signals import recorded_signals
+from crgame_ros.vehicle.lights import HAZARD, Light
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
 _MAX_CELLS = 20_000_000
+_SWITCHES = {'indicator_left': Light.LEFT, 'indicator_right': Light.RIGHT, 'horn': Light.HORN,
+             'braking_lights': Light.BRAKE, 'flashing_blue_lights': Light.BLUE,
+             'hazard_warning_lights': Light(HAZARD)}
 
 
 @dataclass(frozen=True)
@@ -356,3 +360,50 @@ def _with_headings(poses: FloatArray) -> FloatArray:
         source = np.maximum.accumulate(np.where(known, np.arange(len(poses)), -1))
         poses[:, 2] = np.where(source >= 0, poses[source, 2], 0.0)
     return poses
+
+
+@dataclass(frozen=True)
+class RecordedSignals:
+    """
+    What a vehicle shows; each state holds until the next one.
+
+    :param steps: the time steps of its signal states, ascending.
+    :param lights: bits of `Light` in each of them.
+    :param first_k: time step at which the vehicle's recorded course begins.
+    """
+
+    steps: tuple[int, ...]
+    lights: tuple[int, ...]
+    first_k: int
+
+    def at(self, k: int) -> int:
+        """Return the bits of `Light` at a time step; 0 before the first state."""
+        place = bisect_right(self.steps, k)
+        return self.lights[place - 1] if place else 0
+
+
+def recorded_signals(obstacle: Obstacle) -> RecordedSignals | None:
+    """Return the signals of an obstacle; None if the scenario has none for it."""
+    if not isinstance(obstacle, DynamicObstacle):
+        return None
+    first = obstacle.initial_signal_state
+    states = [*(() if first is None else (first,)),
+              *(obstacle.signal_series or ())]
+    if not states:
+        return None
+    lights = {_begin(state.time_step): _bits(state) for state in states}
+    steps = sorted(lights)
+    return RecordedSignals(tuple(steps), tuple(lights[k] for k in steps),
+                           round(exact_value(obstacle.initial_state.time_step)))
+
+
+def _begin(time_step: int | Interval) -> int:
+    return int(time_step.start if isinstance(time_step, Interval) else time_step)
+
+
+def _bits(state: SignalState) -> int:
+    bits = 0
+    for name, light in _SWITCHES.items():
+        if getattr(state, name, False):
+            bits |= light
+    return int(bits)

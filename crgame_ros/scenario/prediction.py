@@ -14,8 +14,8 @@ from typing import Protocol
 from crgame_ros.game.objects import ObjectStates, Role
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.curve import Curve
-from crgame_ros.geometry.reference_point import beside, joined
-from crgame_ros.roads.lane_lookup import LaneLookup
+from crgame_ros.geometry.polyline import EQUAL_DIGITS
+from crgame_ros.geometry.reference_point import beside, joined, seen_from
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.vehicle.state import StateColumn
@@ -36,6 +36,13 @@ _BEHIND = 30.0
 # 200 m beyond a lanelet suffice for 3 s at any legal speed; no planner's horizon exceeds 5 km [m].
 _MIN_REACH, _MAX_REACH = 200.0, 5000.0
 _NO_LANE = -1
+# Nearest samples that are compared: among lanes side by side, crossing and merging, these contain
+# the best one.
+CANDIDATES = 16
+# Only every second sample of the tables is used.
+STRIDE = 2
+# A pose farther than this from every centre line is on no lane [m].
+REACH = 3.0
 
 
 def predict_constant_steering(states: FloatArray, wheelbases: FloatArray, steps: int,
@@ -257,3 +264,45 @@ class LanePrediction:
         self._counts = np.array([len(t) for t in tables])
         self._starts = np.concatenate(([0], np.cumsum(self._counts)[:-1]))
         self._table: FloatArray = np.concatenate(tables)
+
+
+class LaneLookup:
+    """
+    The lanes' centre lines as samples in one tree.
+
+    :param tables: poses (n, 3) along the centre line of each lane, at equal distances.
+    :param spacing: that distance [m]
+    :param max_angle: greatest angle between a pose and a lane on which it drives [rad]
+    """
+
+    def __init__(self, tables: Sequence[FloatArray], spacing: float, max_angle: float) -> None:
+        # A slow import, which only some predictions need.
+        from scipy.spatial import cKDTree
+        tables = [table[::STRIDE] for table in tables]
+        self._poses = np.concatenate(tables)
+        self._lane = np.repeat(np.arange(len(tables)), [len(table) for table in tables])
+        starts = np.concatenate(([0], np.cumsum([len(table) for table in tables])[:-1]))
+        self._s = STRIDE * spacing * (np.arange(len(self._poses)) - starts[self._lane])
+        self._tree = cKDTree(self._poses[:, :2])
+        self._max_angle = max_angle
+
+    def find(self, poses: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+        """
+        Return lane (-1: none), arc length and offset to the left of poses (N, 3).
+
+        Of the lanes whose direction fits, it is the one whose centre line is nearest.
+        """
+        count = min(CANDIDATES, len(self._poses))
+        distance, sample = self._tree.query(poses[:, :2], k=count, distance_upper_bound=REACH)
+        distance, sample = distance.reshape(-1, count), sample.reshape(-1, count)
+        known = np.minimum(sample, len(self._poses) - 1)
+        angle = np.abs(wrap_pi_array(poses[:, None, 2] - self._poses[known, 2]))
+        cost = np.round(np.where(angle <= self._max_angle, distance, math.inf), EQUAL_DIGITS)
+        # Lanes that fork lie upon each other at first: of equally near ones the first counts.
+        nearest_first = cost == cost.min(axis=1, keepdims=True)
+        best = np.argmin(np.where(nearest_first, known, len(self._poses)), axis=1)
+        rows = np.arange(len(poses))
+        found = np.isfinite(cost[rows, best])
+        nearest = known[rows, best]
+        along, aside = seen_from(self._poses[nearest], poses[:, :2])
+        return np.where(found, self._lane[nearest], -1), self._s[nearest] + along, aside

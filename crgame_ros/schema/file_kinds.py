@@ -21,7 +21,6 @@ from crgame_ros.schema.declaration import (
     sentences_of,
     split,
 )
-from crgame_ros.schema.known import keys_beside
 from crgame_ros.schema.marks import (
     Folder,
     Keyed,
@@ -34,6 +33,7 @@ from crgame_ros.schema.marks import (
     Within,
     Wording,
 )
+from crgame_ros.schema.reading import keys_beside
 from crgame_ros.schema.writing import write
 
 Schema = dict[str, Any]

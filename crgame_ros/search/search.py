@@ -20,7 +20,7 @@ from crgame_ros.evaluation.judging import check_expectations, expectations_of, k
 from crgame_ros.evaluation.plan import EvaluationPlan, parse_plan, PlannerChoice
 from crgame_ros.evaluation.results.parts import ResultParts
 from crgame_ros.game.expectation import Expectation
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.schema.writing import write
 from crgame_ros.search.boundary import (
     Boundary,

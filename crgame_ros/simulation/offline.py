@@ -23,8 +23,7 @@ from crgame_ros.simulation.av_models import make_perception, published_states
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.observer import drivability_monitor, ObservedRun, RunObserver
 from crgame_ros.simulation.plan_requests import request_topic
-from crgame_ros.simulation.plan_status import refusal_status
-from crgame_ros.simulation.run_messages import MessageLog, RunMessage
+from crgame_ros.simulation.run_messages import MessageLog, refusal_status, RunMessage
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.driver_command import COMMAND_WIDTH, DriverCommand, RELEASED

@@ -24,9 +24,9 @@ from crgame_ros.game.task_spec import (
     TaskCondition,
     TaskSpec,
 )
-from crgame_ros.simulation.condition_check import ConditionCheck
+from crgame_ros.simulation.game_check import task_seat
+from crgame_ros.simulation.run_events import ConditionCheck
 from crgame_ros.simulation.setup import Setup
-from crgame_ros.simulation.task_check import task_seat
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 

@@ -13,7 +13,7 @@ from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.driver.source import load_timeline, parse_source
 from crgame_ros.driver.timeline import timeline_text
 from crgame_ros.errors import InputError, one_line
-from crgame_ros.game.driven_vehicle import DrivenHuman
+from crgame_ros.game.documents import DrivenHuman
 from crgame_ros.game.game import AvSpec, Game
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
@@ -22,20 +22,20 @@ from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.registry import POLICY
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.exact_values import exact_position
-from crgame_ros.scenario.export_check import refuse_unwritable
+from crgame_ros.scenario.export_goals import refuse_unwritable
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
 from crgame_ros.scripted.objects import ScriptedObjects
 from crgame_ros.simulation.av_assignment import assign_avs, Part
 from crgame_ros.simulation.av_models import check_models
-from crgame_ros.simulation.event_check import (
+from crgame_ros.simulation.game_check import (
     check_changes,
     check_events,
+    check_tasks,
     held_obstacles,
     put_obstacles,
 )
-from crgame_ros.simulation.task_check import check_tasks
 from crgame_ros.simulation.traffic_setup import adopted_columns, place_traffic, TrafficSetup
 from crgame_ros.vehicle.parameters import load_vehicle_parameters, VehicleParameters
 from crgame_ros.vehicle.state import VehicleState

@@ -1,28 +1,37 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reactive traffic of a run before its first step, for both runners and for traffic_node."""
+"""
+Reactive traffic before its first step, and the world as it sees it.
+
+Driven vehicles are read as the joints that `/vehicles/state` carries.
+"""
 
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from crgame_ros.game.objects import ObjectDescription, ObjectStates, whole_id
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role, whole_id
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.geometry.reference_point import shifted, shifted_velocities
+from crgame_ros.messages.joints import vehicle_to_joints
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.simulation.world_reader import joints_of, WorldReader
 from crgame_ros.vehicle.state import VehicleState
+import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:  # Both import numba: only runs with agents should wait for that.
+if TYPE_CHECKING:
     from crgame_ros.traffic.fleet.world_view import WorldView
     from crgame_ros.traffic.traffic import Traffic
 
 # Agents move at this rate, independent of the simulation's rate [Hz] (FS III).
 MOTION_RATE = 100.0
+FloatArray = NDArray[np.float64]
+Joints = Sequence[Sequence[float]] | FloatArray
 
 
 @dataclass(frozen=True)
@@ -103,3 +112,60 @@ def place_traffic(spec: TrafficSpec, loaded: LoadedScenario, network: RoadNetwor
     # Reading the roads takes seconds on large maps: the first call returns the agents made here.
     made = [fresh()]
     return TrafficSetup(made[0].descriptions, lambda: made.pop() if made else fresh())
+
+
+def driven_centers(positions: Joints, velocities: Joints,
+                   rear_to_center: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+    """
+    Return the centres of driven vehicles.
+
+    :param positions: (V, 4) joints of the rear axles
+    :param velocities: (V, 4) their derivatives
+    :param rear_to_center: (V) from the rear axle to the centre [m]
+    :return: poses and velocities, both (V, 3)
+    """
+    poses, rates = (np.array(rows, dtype=np.float64).reshape(-1, 4)[:, :3]
+                    for rows in (positions, velocities))
+    distance = np.array(rear_to_center)
+    return shifted(poses, distance), shifted_velocities(poses[:, 2], rates, distance)
+
+
+class WorldReader:
+    """
+    Builds the agents' view of the world from joints and objects.
+
+    :param descriptions: of everything that can appear: driven vehicles, then objects.
+    :param lights: the traffic lights.
+    """
+
+    def __init__(self, descriptions: Sequence[ObjectDescription], lights: TrafficLights) -> None:
+        driven = [item for item in descriptions if item.role.is_ego]
+        objects = [item for item in descriptions if not item.role.is_ego]
+        self._ahead = [item.rear_to_center for item in driven]
+        self._lights = lights
+        self._columns = [column for column, item in enumerate(objects)
+                         if item.role is not Role.TRAFFIC]
+        self.others: tuple[ObjectDescription, ...] = (
+            *driven, *(objects[column] for column in self._columns))
+
+    def view(self, k: int, positions: Joints, velocities: Joints,
+             objects: ObjectStates) -> 'WorldView':
+        """
+        Return what agents react to at tick k.
+
+        :param positions: (V, 4) joints of the driven vehicles
+        :param velocities: (V, 4)
+        :param objects: all objects.
+        """
+        # This imports numba, which only runs with agents should wait for.
+        from crgame_ros.traffic.fleet.world_view import WorldView
+        poses, rates = driven_centers(positions, velocities, self._ahead)
+        return WorldView(k, np.concatenate((poses, objects.poses[self._columns])),
+                         np.concatenate((rates, objects.velocities[self._columns])),
+                         self._lights.states_at(k))
+
+
+def joints_of(states: Sequence[VehicleState]) -> tuple[Joints, Joints]:
+    """Return the joint positions and velocities of driven vehicles, (V, 4) each."""
+    joints = [vehicle_to_joints(state) for state in states]
+    return [item[0] for item in joints], [item[1] for item in joints]

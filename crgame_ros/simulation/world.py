@@ -8,17 +8,12 @@ from typing import Protocol, TYPE_CHECKING
 from crgame_ros.game.events import EventSpec, SpeedLimit, TrafficOrder
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.roads.speed_limits import set_speed_limit, with_own_roads
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.simulation.run_events import RunEvents
 from crgame_ros.simulation.setup import Setup
-from crgame_ros.simulation.world_reader import (
-    driven_centers,
-    FloatArray,
-    joints_of,
-    WorldReader,
-)
+from crgame_ros.simulation.traffic_setup import driven_centers, FloatArray, joints_of, WorldReader
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 

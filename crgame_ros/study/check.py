@@ -10,7 +10,7 @@ from itertools import pairwise, product
 from typing import Literal
 
 from crgame_ros.errors import CrgameError
-from crgame_ros.game.file import parse_game
+from crgame_ros.game.game import parse_game
 from crgame_ros.instruments.extra import require_instruments
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup

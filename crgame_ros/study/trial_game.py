@@ -8,8 +8,7 @@ from typing import Any
 
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import Game, HumanSpec
+from crgame_ros.game.game import Game, HumanSpec, load_game
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.scenario.loading import load_scenario

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from crgame_ros.game.game import TimingSpec
 
 NS = 1e-9
+# Bounds of a run's real-time factor, in simulated seconds per second.
 MIN_REAL_TIME_FACTOR = 0.1
 MAX_REAL_TIME_FACTOR = 10.0
 

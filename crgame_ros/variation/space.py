@@ -13,8 +13,7 @@ from statistics import NormalDist
 from typing import Any
 
 from crgame_ros.errors import InputError, short
-from crgame_ros.game.file import parse_game
-from crgame_ros.game.game import Game
+from crgame_ros.game.game import Game, parse_game
 from crgame_ros.game.variation_spec import (
     Constraint,
     Derived,

@@ -5,7 +5,7 @@
 import math
 from math import copysign
 
-from crgame_ros.vehicle.kinematic_single_track import integrate
+from crgame_ros.vehicle.models import integrate
 from crgame_ros.vehicle.parameters import VehicleParameters
 import numpy as np
 from numpy.typing import NDArray

@@ -12,8 +12,7 @@ import time
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.expectation import Expectation
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import Game
+from crgame_ros.game.game import Game, load_game
 
 
 def replay_command(folder: Path) -> str:

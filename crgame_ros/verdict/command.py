@@ -104,7 +104,7 @@ def run(values: argparse.Namespace) -> int:
 
 
 def _cases(values: argparse.Namespace) -> 'list[Case]':
-    from crgame_ros.game.file import load_game
+    from crgame_ros.game.game import load_game
     from crgame_ros.launcher.arguments import read_options
     from crgame_ros.paths import find_game
     from crgame_ros.schema.marks import named_file

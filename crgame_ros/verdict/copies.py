@@ -18,8 +18,7 @@ from commonroad.planning.planning_problem import PlanningProblemSet
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.driver.source import parse_source
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import Game
+from crgame_ros.game.game import Game, load_game
 from crgame_ros.schema.writing import write
 from crgame_ros.yaml_text import read_yaml
 import numpy as np

@@ -234,7 +234,7 @@ def _yaml(path: Path, _progress: Progress | None) -> FileVerdict:
     remarks: tuple[str, ...] = ()
     if file_kind.declared is Game and not faults:
         from crgame_ros.evaluation.judging import check_expectations
-        from crgame_ros.game.file import parse_game
+        from crgame_ros.game.game import parse_game
         try:
             game = parse_game(values, str(path), path.parent)
             check_expectations(game, str(path))

@@ -15,13 +15,11 @@ from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.scenario.export_document import (
     document_text,
-    refuse_invalid,
-    scenario_header,
-)
-from crgame_ros.scenario.export_elements import (
     goal_state,
     lanelet_references,
     planning_problem,
+    refuse_invalid,
+    scenario_header,
 )
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.waypoints.lanelets import Bounds, DECIMALS, FloatArray, lane_bounds

@@ -12,8 +12,13 @@ from crgame_ros.errors import InputError, one_line
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario import guard
-from crgame_ros.scenario.export_document import scenario_document, scenario_header
-from crgame_ros.scenario.export_elements import goal_state, lanelet_references, planning_problem
+from crgame_ros.scenario.export_document import (
+    goal_state,
+    lanelet_references,
+    planning_problem,
+    scenario_document,
+    scenario_header,
+)
 from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.export_network import used_ids, write_roads
 from crgame_ros.scenario.loading import parse_scenario

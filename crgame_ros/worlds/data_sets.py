@@ -21,13 +21,14 @@ from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.exact_values import exact_value
-from crgame_ros.scenario.export_document import scenario_document, scenario_header
-from crgame_ros.scenario.export_elements import (
+from crgame_ros.scenario.export_document import (
     dynamic_obstacle,
     DYNAMIC_TYPES,
     goal_state,
     placed_rectangle,
     planning_problem,
+    scenario_document,
+    scenario_header,
     whole,
 )
 from crgame_ros.scenario.export_ids import IdPool

@@ -8,10 +8,9 @@ import signal
 
 from browser_support import Browser
 from crgame_ros.launcher.run_plan import effective_setup, RunRequest
-from crgame_ros.recording.recorded_events import read_run_events
-from crgame_ros.recording.recorded_inputs import recorded_inputs
-from crgame_ros.recording.recorded_states import recorded_states
+from crgame_ros.recording.recorded_game import read_run_events, recorded_inputs
 from crgame_ros.recording.run_folder import run_folders
+from crgame_ros.recording.run_points import recorded_states
 from crgame_ros.recording.run_record import read_drivers
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.verdict.validation import validate

@@ -12,7 +12,7 @@ from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality
 from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.cockpit.frames import STATE_COLUMNS
 from crgame_ros.cockpit.replay_backend import ReplayBackend
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import default_game
 from crgame_ros.recording.offline_recording import write_recording
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories

@@ -13,9 +13,9 @@ from typing import Any
 from browser_support import Browser
 from crgame_ros.analysis.report.file import report_html
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.recorded_game import recorded_inputs
 from crgame_ros.recording.run_record import run_record_of
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup

@@ -18,9 +18,9 @@ from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.page_messages import Command, Control, Rate
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.server import create_app, listen
-from crgame_ros.game.file import load_game
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.game.game import load_game
 from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup
 import numpy as np
 from numpy.typing import NDArray

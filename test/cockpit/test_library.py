@@ -17,7 +17,7 @@ from crgame_ros.cockpit.job_process import JobProcess
 from crgame_ros.cockpit.library import Library, READER
 from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.setup import build_setup
 import pytest

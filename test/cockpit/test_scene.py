@@ -11,12 +11,12 @@ from typing import Any
 
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.game.documents import GAME
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup, Setup
 import numpy as np
 import pytest

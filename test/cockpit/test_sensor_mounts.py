@@ -6,8 +6,8 @@ from collections import OrderedDict
 import copy
 
 from crgame_ros.cockpit.message_frames import SensorMounts
-from crgame_ros.game.driven_vehicle import DrivenAv
-from crgame_ros.game.file import load_game
+from crgame_ros.game.documents import DrivenAv
+from crgame_ros.game.game import load_game
 from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.perception.sensors import MountedSensor

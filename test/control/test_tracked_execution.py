@@ -9,7 +9,7 @@ import control_support as support
 from control_support import DT, DT_C, VEHICLE
 from crgame_ros.control.tracked_execution import TrackedExecution
 from crgame_ros.control.tracker import Control, Reference, Tracker
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.dynamic_bicycle import DynamicBicycle

@@ -10,7 +10,7 @@ from crgame_ros.evaluation.cell_grid import make_grid
 from crgame_ros.evaluation.cell_process import CellProcess
 from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.plan import parse_plan
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup

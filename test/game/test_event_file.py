@@ -25,7 +25,7 @@ from crgame_ros.game.events import (
     SpeedLimit,
     TrafficChange,
 )
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.schema.reading import read
 import pytest
 import yaml

@@ -7,13 +7,13 @@ import math
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
 from crgame_ros.game.game import (
     AvSpec,
     DrivabilitySpec,
     Game,
     HumanSpec,
     LaneletSpawn,
+    load_game,
     PoseSpawn,
     PredictionSpec,
     TimingSpec,

@@ -4,9 +4,7 @@
 
 import math
 
-from crgame_ros.geometry.outline import outline, placed
-from crgame_ros.geometry.overlap import touches
-from crgame_ros.geometry.shape import Shape
+from crgame_ros.geometry.shape import outline, placed, Shape, touches
 import numpy as np
 import pytest
 import shapely

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from crgame_ros.drivability.monitor import DrivabilityMonitor
 from crgame_ros.errors import CrgameError
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import LaneletSpawn
+from crgame_ros.game.game import LaneletSpawn, load_game
 from crgame_ros.gym.driving_env import DrivingEnv
 from crgame_ros.gym.driving_game import DrivingGame
 from crgame_ros.gym.episode_setups import EpisodeSetups, StartVariation

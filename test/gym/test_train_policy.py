@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np

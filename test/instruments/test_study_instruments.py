@@ -6,12 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game, parse_game
+from crgame_ros.game.game import load_game, parse_game
 from crgame_ros.game.instruments_spec import InstrumentsSpec
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.schema.reading import read
-from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.roster import Participants
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.study.trial_game import trial_game
 from crgame_ros.study.trial_settings import laid, TrialSettings

@@ -8,8 +8,7 @@ from pathlib import Path
 import socket
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import Game, HumanSpec
+from crgame_ros.game.game import Game, HumanSpec, load_game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, plan_run
 from crgame_ros.paths import scenarios_directory

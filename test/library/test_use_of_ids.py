@@ -12,7 +12,7 @@ from crgame_ros.cli import main
 from crgame_ros.evaluation.cell_grid import make_grid
 from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.plan import parse_plan
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.launcher.arguments import parse_arguments
 from crgame_ros.launcher.run_plan import plan_run
 import pytest

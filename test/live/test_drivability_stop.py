@@ -5,9 +5,9 @@
 from dataclasses import replace
 from pathlib import Path
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.recorded_game import recorded_inputs
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup

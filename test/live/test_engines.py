@@ -6,16 +6,16 @@ from collections.abc import Iterator
 from pathlib import Path
 import re
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.messages.joints import from_joint_trajectory, vehicles_from_joints
 from crgame_ros.perception.perception import Perception
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.ros.messages import from_time
 from crgame_ros.simulation.av_models import make_perception
 from crgame_ros.simulation.setup import build_setup, Setup
-from crgame_ros.simulation.world_reader import WorldReader
+from crgame_ros.simulation.traffic_setup import WorldReader
 from crgame_ros.vehicle.state import VehicleState
 from live_peer import Peer
 from live_support import Launcher, SCENARIOS

@@ -9,9 +9,12 @@ from typing import NamedTuple
 
 from crgame_ros.game.documents import EVENTS
 from crgame_ros.game.events import AtStep, FiredEvent
-from crgame_ros.game.file import load_game
-from crgame_ros.recording.recorded_events import read_run_events
-from crgame_ros.recording.recorded_inputs import recorded_inputs, with_replayed_events
+from crgame_ros.game.game import load_game
+from crgame_ros.recording.recorded_game import (
+    read_run_events,
+    recorded_inputs,
+    with_replayed_events,
+)
 from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.ros.messages import from_time
 from crgame_ros.simulation.offline import run_offline

@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 from commonroad.common.file_reader import CommonRoadFileReader
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.vehicle.state import StateColumn
 from live_support import CUT_IN, Launcher, ROOT

@@ -9,10 +9,10 @@ from pathlib import Path
 import subprocess
 import sys
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.messages.joints import vehicle_to_joints
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.recorded_game import recorded_inputs
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.run_folder import run_folder
 from crgame_ros.ros.messages import from_time

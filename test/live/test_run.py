@@ -20,7 +20,7 @@ from crgame_ros.analysis.criticality.rows import (
     read_criticality_rows,
 )
 from crgame_ros.cli import main
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.recording.metadata import read_metadata
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import read_cycles

@@ -10,7 +10,7 @@ import time
 from typing import Any
 import urllib.request
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from live_support import is_node, Launcher, SCENARIOS, wait_until
 from page_client import PageClient
 import pytest

@@ -4,11 +4,10 @@
 
 from pathlib import Path
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.recorded_events import read_run_events
-from crgame_ros.recording.recorded_inputs import with_recorded_events
+from crgame_ros.recording.recorded_game import read_run_events, with_recorded_events
 from crgame_ros.ros.messages import from_time
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from commonroad.common.file_reader import CommonRoadFileReader
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.messages.joints import from_joint_trajectory
 from crgame_ros.recording.export import export_scenario
 from crgame_ros.recording.reader import BagReader

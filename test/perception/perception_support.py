@@ -18,7 +18,7 @@ from crgame_ros.messages.joints import (
 )
 from crgame_ros.perception.localisation import Localisation
 from crgame_ros.perception.perception import Perception
-from crgame_ros.vehicle.kinematic_single_track import integrate
+from crgame_ros.vehicle.models import integrate
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np

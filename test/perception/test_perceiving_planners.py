@@ -6,7 +6,7 @@ from dataclasses import replace
 import math
 from typing import NamedTuple
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.game.perception_spec import LocalisationSpec, PerceptionSpec, SensorSpec
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.paths import scenarios_directory

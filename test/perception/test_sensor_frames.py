@@ -6,7 +6,7 @@ from importlib.util import find_spec
 import math
 import time
 
-from crgame_ros.game.driven_vehicle import DrivenAv
+from crgame_ros.game.documents import DrivenAv
 from crgame_ros.game.perception_spec import LocalisationSpec, SensorSpec
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.nodes.marker_node import sensor_transforms, Transforms, vehicle_transforms

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.policy.observation import Observation, ObservationHistory

@@ -6,8 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game, parse_game
-from crgame_ros.game.game import Game
+from crgame_ros.game.game import Game, load_game, parse_game
 from crgame_ros.policy.policy_file import load_policy
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from typing import Any
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import default_game, scenarios_directory
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup

@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 from crgame_ros.recording.export import export_scenario
-from crgame_ros.roads.signals import traffic_light_states
+from crgame_ros.roads.signs import traffic_light_states
 from crgame_ros.scenario.loading import parse_scenario
 import pytest
 

@@ -13,7 +13,7 @@ from crgame_ros.recording.conversion import convert
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.info import describe
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.recorded_events import read_run_events
+from crgame_ros.recording.recorded_game import read_run_events
 from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.recording.timing_report import timing_report
 from crgame_ros.simulation.offline import OfflineResult

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from commonroad.common.reader.file_reader_xml import XMLFileReader
 from crgame_ros.game.game import AvSpec
 from crgame_ros.recording.finish import finish_run, OK
-from crgame_ros.recording.gap_filling import bridge_objects, LONGEST_GAP_S
+from crgame_ros.recording.resampling import bridge_objects, LONGEST_GAP_S
 from crgame_ros.recording.run_trajectories import (
     read_trajectories,
     RunTrajectories,

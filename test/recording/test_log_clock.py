@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The times that a recording gets, while somebody sets the system clock."""
 
-from crgame_ros.recording.log_clock import LogClock
+from crgame_ros.recording.writer import LogClock
 import pytest
 
 MS, S = 1_000_000, 1_000_000_000

@@ -16,8 +16,7 @@ from crgame_ros.analysis.tables.run_tables import tables_of
 from crgame_ros.cli import main
 from crgame_ros.cockpit.replay_backend import ReplayBackend
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import Game
+from crgame_ros.game.game import Game, load_game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup
 from crgame_ros.messages.contract import load_contract
@@ -196,7 +195,7 @@ WRITE = """
 import sys, resource
 from pathlib import Path
 from crgame_ros.errors import CrgameError
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import default_game
 from crgame_ros.recording.offline_recording import write_recording
 from crgame_ros.simulation.offline import run_offline

@@ -10,7 +10,7 @@ from typing import Any
 from crgame_ros.analysis.behaviour.driver import measure_behaviour
 from crgame_ros.cli import main
 from crgame_ros.driver.source import ReplayDriver
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.run_record import (
     read_run_record,

@@ -9,9 +9,9 @@ from typing import Any
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.cli import main
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.recorded_game import recorded_inputs
 from crgame_ros.recording.run_trajectories import read_trajectories, trajectories_of
 from crgame_ros.simulation.offline import observed_run, OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup

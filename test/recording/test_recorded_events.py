@@ -9,11 +9,14 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import AtStep
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.conversion import convert
-from crgame_ros.recording.recorded_events import read_run_events
-from crgame_ros.recording.recorded_inputs import recorded_inputs, with_replayed_events
+from crgame_ros.recording.recorded_game import (
+    read_run_events,
+    recorded_inputs,
+    with_replayed_events,
+)
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.simulation.offline import OfflineResult, run_offline

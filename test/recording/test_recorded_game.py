@@ -12,13 +12,11 @@ from crgame_ros.cli import main
 from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GAME
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import AvSpec, Game, HumanSpec, ModelSpec, PoseSpawn
+from crgame_ros.game.game import AvSpec, Game, HumanSpec, load_game, ModelSpec, PoseSpawn
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup, plan_run
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.recorded_game import read_recorded_game
-from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.recorded_game import read_recorded_game, recorded_inputs
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np

@@ -23,7 +23,7 @@ from crgame_ros.messages.instrument_samples import (
     SampleBatch,
     STREAMS,
 )
-from crgame_ros.recording.view_pictures import read_pictures
+from crgame_ros.recording.views import read_pictures
 from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
 import pandas as pd

@@ -11,7 +11,7 @@ from crgame_ros.cli import main
 from crgame_ros.evaluation.judging import check_expectations, shortfalls
 from crgame_ros.evaluation.results.cell_rows import vehicle_rows
 from crgame_ros.game.expectation import Expectation
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline

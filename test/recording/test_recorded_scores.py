@@ -18,10 +18,10 @@ from crgame_ros.analysis.scores.scored_run import score_run
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.plan_outcome import plans_of_result
-from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.recorded_game import recorded_inputs
+from crgame_ros.recording.recorded_plans import plans_of_result
 from crgame_ros.recording.run_record import run_record_of, RunRecord
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.simulation.offline import OfflineResult, run_offline

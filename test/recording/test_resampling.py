@@ -10,8 +10,7 @@ from typing import Any
 
 from commonroad.common.reader.file_reader_xml import XMLFileReader
 from crgame_ros.driver.source import ReplayDriver
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import AvSpec, Game, HumanSpec, LaneletSpawn, TimingSpec
+from crgame_ros.game.game import AvSpec, Game, HumanSpec, LaneletSpawn, load_game, TimingSpec
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.conversion import convert
 from crgame_ros.recording.export import write_scenario

@@ -5,9 +5,9 @@
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.recorded_game import recorded_inputs
 from crgame_ros.recording.run_record import read_run_record, run_record_of
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup

@@ -21,11 +21,11 @@ from crgame_ros.analysis.tables.writer import FORMATS
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import FiredEvent
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.messages.joints import plan_to_joints
 from crgame_ros.messages.plan import Plan
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.recorded_game import recorded_inputs
 from crgame_ros.recording.recorded_plans import RecordedPlan
 from crgame_ros.recording.run_folder import run_name
 from crgame_ros.recording.run_record import run_record_of, RunRecord

@@ -8,7 +8,7 @@ import shutil
 from typing import Any
 
 from crgame_ros.cli import main
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory, share_directory
 from crgame_ros.recording.finish import finish_run
 from crgame_ros.simulation.offline import run_offline

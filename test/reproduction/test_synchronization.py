@@ -10,7 +10,7 @@ import time
 
 from crgame_ros.analysis.pictures.timing_figure import TimedRun
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS, TimingTable
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.reproduction.synchronization import (
     judge_synchronization,

@@ -4,7 +4,7 @@
 
 import math
 
-from crgame_ros.roads.lane_lookup import LaneLookup
+from crgame_ros.scenario.prediction import LaneLookup
 import numpy as np
 import pytest
 

@@ -11,7 +11,7 @@ from commonroad.scenario.traffic_light import (
     TrafficLightCycleElement,
     TrafficLightState,
 )
-from crgame_ros.roads.signals import traffic_light_states, TrafficLights
+from crgame_ros.roads.signs import traffic_light_states, TrafficLights
 from crgame_ros.scenario.loading import load_scenario
 import numpy as np
 import pytest

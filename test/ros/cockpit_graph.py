@@ -15,7 +15,7 @@ from crgame_ros.game.seat_documents import SeatEntry, SeatPerson, SEATS
 from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
 from crgame_ros.nodes.cockpit.backend import LiveBackend
 from crgame_ros.ros.messages import StateMessage
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import Setup
 from live_peer import Peer
 import numpy as np

@@ -9,7 +9,7 @@ from typing import Any
 
 from cockpit_graph import OFFSET_NS
 from crgame_ros.cli import main
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec
 from crgame_ros.ros.messages import to_time
 from crgame_ros.simulation.setup import build_setup, Setup

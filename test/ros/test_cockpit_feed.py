@@ -13,7 +13,7 @@ from crgame_ros.cockpit.page_messages import SeenView, Sound
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import EVENTS, FiredEvents
 from crgame_ros.game.events import FiredEvent
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.game.instruments_spec import GazeSpec, InstrumentsSpec
 from crgame_ros.game.view_documents import VIEW_PICTURE
 from crgame_ros.messages.status_values import read_status

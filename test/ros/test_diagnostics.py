@@ -8,7 +8,7 @@ from pathlib import Path
 import time
 
 from cockpit_graph import Graph, lived, OFFSET_NS
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.ros.endpoints import Endpoints, NodeReport
 from crgame_ros.ros.messages import from_time, to_time
 from crgame_ros.simulation.setup import build_setup

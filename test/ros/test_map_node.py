@@ -9,13 +9,13 @@ import subprocess
 import sys
 
 from crgame_ros.game.documents import GAME
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.messages.joints import vehicle_joint_names
 from crgame_ros.occupancy.map_file import RasterSpec
 from crgame_ros.occupancy.rasterize import Raster, write_map
 from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup
 from live_peer import Peer
 from live_support import CUT_IN, PATIENCE_S

@@ -8,7 +8,7 @@ from pathlib import Path
 import threading
 
 from crgame_ros.game.documents import GAME, OBJECTS
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
 from crgame_ros.nodes import marker_node
 from crgame_ros.nodes.marker_node import MarkerNode
@@ -16,7 +16,7 @@ from crgame_ros.nodes.markers.roads import NAMESPACES
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import from_time, StateMessage
 from crgame_ros.ros.node_main import StopFlag
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup, Setup
 from live_peer import Peer
 from live_support import Launcher

@@ -7,11 +7,10 @@ import math
 from pathlib import Path
 
 from crgame_ros.game.documents import GAME, OBJECTS, Signals
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
-from crgame_ros.geometry.outline import outline
 from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.geometry.shape import Shape
+from crgame_ros.geometry.shape import outline, Shape
 from crgame_ros.messages.joints import JointSeries, object_joint_names, vehicle_joint_names
 from crgame_ros.nodes.markers import bodies
 from crgame_ros.nodes.markers.bodies import Body
@@ -19,7 +18,7 @@ from crgame_ros.nodes.markers.markers import AvPaths, SceneMarkers
 from crgame_ros.nodes.markers.roads import line_segments, map_markers, NAMESPACES
 from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
 from crgame_ros.scenario.loading import load_scenario, parse_scenario
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup, Setup
 from live_support import SCENARIOS
 import numpy as np

@@ -7,9 +7,9 @@ from itertools import permutations
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GAME, OBJECTS
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.ros.scenario_documents import DocumentCollector, KINDS
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup
 from live_support import SCENARIOS
 import pytest

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from crgame_ros.driver.seat_state import GAME_DRIVER
 from crgame_ros.driver.source import ReplayDriver
-from crgame_ros.game.file import load_game
-from crgame_ros.recording.recorded_inputs import RecordedInputs
+from crgame_ros.game.game import load_game
+from crgame_ros.recording.recorded_game import RecordedInputs
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import to_joy
 from crgame_ros.ros.seats import COMMAND_DEPTH, MAX_ORDERS, Seat, Seats

@@ -12,7 +12,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.messages.contract import load_contract
 from crgame_ros.nodes.sim.control import SimControl

@@ -7,8 +7,8 @@ import subprocess
 import sys
 
 from crgame_ros.game.documents import GAME
-from crgame_ros.game.file import load_game
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.game.game import load_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.timing.cycle_rows import CycleRows
 from crgame_ros.timing.time_controller import Cycle

@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator
 import time
 
 from crgame_ros.game.documents import GAME, OBJECTS
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.messages.joints import object_joint_names, vehicle_joint_names
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import StateMessage
 from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup
 from live_support import PATIENCE_S, SCENARIOS
 import numpy as np

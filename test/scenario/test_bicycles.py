@@ -6,8 +6,7 @@ import math
 from pathlib import Path
 
 from crgame_ros.cli import main
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import HumanSpec
+from crgame_ros.game.game import HumanSpec, load_game
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.python_interface.offline_runs import drive
 from crgame_ros.roads.network import RoadNetwork

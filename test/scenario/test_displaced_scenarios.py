@@ -9,7 +9,7 @@ import time
 from crgame_ros.cli import main
 from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario import guard
 from crgame_ros.simulation.offline import OfflineResult, run_offline

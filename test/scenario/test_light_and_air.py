@@ -7,12 +7,11 @@ from pathlib import Path
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GAME
-from crgame_ros.game.file import load_game, parse_game
-from crgame_ros.game.game import EnvironmentSpec
+from crgame_ros.game.game import EnvironmentSpec, load_game, parse_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.scenario.loading import parse_scenario
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup
 import pytest
 import yaml

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import functools
 from typing import Any
 
-from crgame_ros.game.file import parse_game
+from crgame_ros.game.game import parse_game
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.idm import IdmPlanner

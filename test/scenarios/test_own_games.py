@@ -12,7 +12,7 @@ import functools
 from pathlib import Path
 
 from crgame_ros.drivability.monitor import VehicleDrivability
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup

@@ -13,7 +13,7 @@ from commonroad.common.file_reader import CommonRoadFileReader
 from commonroad.planning.planning_problem import PlanningProblemSet
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from commonroad.scenario.scenario import Scenario
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from lxml import etree
 import numpy as np

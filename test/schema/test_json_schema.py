@@ -11,7 +11,7 @@ from typing import Any
 
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game, parse_game
+from crgame_ros.game.game import load_game, parse_game
 from crgame_ros.occupancy.map_file import map_text
 from crgame_ros.paths import config_directory, scenarios_directory
 from crgame_ros.schema.file_kinds import FILE_KINDS

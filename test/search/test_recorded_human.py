@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.offline_recording import write_recording

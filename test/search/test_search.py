@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.schema.writing import write
 from crgame_ros.search.boundary import Boundary, importance_interval, pool_of

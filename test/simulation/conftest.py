@@ -5,7 +5,7 @@
 from pathlib import Path
 import sys
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 import pytest

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import AvSpec, Game, HumanSpec
+from crgame_ros.game.game import AvSpec, Game, HumanSpec, load_game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
 from crgame_ros.paths import scenarios_directory

@@ -12,13 +12,12 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GAME, OBJECTS
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import DrivabilitySpec
+from crgame_ros.game.game import DrivabilitySpec, load_game
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.loading import LoadedScenario
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.steering import load_steering_ratio, table_text

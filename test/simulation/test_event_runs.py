@@ -9,10 +9,9 @@ from typing import Any
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import AtStep, AtTime, EventList, FiredEvent
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import Game
+from crgame_ros.game.game import Game, load_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.recorded_inputs import with_recorded_events
+from crgame_ros.recording.recorded_game import with_recorded_events
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup

@@ -5,10 +5,10 @@
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import parse_game
+from crgame_ros.game.game import parse_game
 from crgame_ros.game.objects import Role
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.recorded_inputs import with_recorded_events
+from crgame_ros.recording.recorded_game import with_recorded_events
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup, Setup
 import numpy as np

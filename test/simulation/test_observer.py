@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Observers get all that a live run publishes, and change nothing."""
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.observer import drivability_monitor

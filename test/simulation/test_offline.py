@@ -8,8 +8,7 @@ from typing import ClassVar
 
 from crgame_ros.driver.source import DriverSource, ReplayDriver
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import AvSpec, DrivabilitySpec, HumanSpec
+from crgame_ros.game.game import AvSpec, DrivabilitySpec, HumanSpec, load_game
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.interface import Planner, PlannerContext

@@ -5,7 +5,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from crgame_ros.game.file import parse_game
+from crgame_ros.game.game import parse_game
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.av_models import ego_of, make_perception, published_states

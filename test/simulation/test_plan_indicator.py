@@ -5,7 +5,7 @@
 from pathlib import Path
 
 from commonroad.common.file_reader import CommonRoadFileReader
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.export import write_scenario
 from crgame_ros.recording.run_trajectories import trajectories_of

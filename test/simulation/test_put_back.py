@@ -9,12 +9,11 @@ from pathlib import Path
 from crgame_ros.analysis.behaviour.lane_keeping import keep_lane
 from crgame_ros.analysis.scores.scored_run import score_run
 from crgame_ros.driver.source import ReplayDriver
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import DrivabilitySpec, HumanSpec, PoseSpawn
+from crgame_ros.game.game import DrivabilitySpec, HumanSpec, load_game, PoseSpawn
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.export import write_scenario
-from crgame_ros.recording.recorded_inputs import inputs_of
+from crgame_ros.recording.recorded_game import inputs_of
 from crgame_ros.recording.run_record import run_record_of
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.simulation.contacts import contacts_of

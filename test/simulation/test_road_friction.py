@@ -4,8 +4,7 @@
 
 from dataclasses import replace
 
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import AvSpec, EnvironmentSpec, PoseSpawn
+from crgame_ros.game.game import AvSpec, EnvironmentSpec, load_game, PoseSpawn
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.simulation.offline import run_offline

@@ -9,13 +9,12 @@ from typing import Any
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import EVENTS, FiredEvents, GAME
 from crgame_ros.game.events import EventList, EventSpec, FiredEvent
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import AvSpec, HumanSpec, PoseSpawn
+from crgame_ros.game.game import AvSpec, HumanSpec, load_game, PoseSpawn
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.engine import Simulation
-from crgame_ros.simulation.game_description import describe_game
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 import pytest

@@ -10,8 +10,7 @@ from typing import Any
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GAME
 from crgame_ros.game.events import EventList
-from crgame_ros.game.file import parse_game
-from crgame_ros.game.game import HumanSpec, PoseSpawn
+from crgame_ros.game.game import HumanSpec, parse_game, PoseSpawn
 from crgame_ros.game.task_documents import (
     PageTimes,
     TASK_LOG,
@@ -27,9 +26,9 @@ from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.engine import Simulation
-from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.run_tasks import StimulusSchedule
+from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.vehicle.driver_command import DriverCommand
 import numpy as np

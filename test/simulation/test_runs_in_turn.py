@@ -5,7 +5,7 @@
 from dataclasses import replace
 from typing import ClassVar
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.idm import IdmPlanner
 from crgame_ros.planner.interface import PlannerContext

@@ -9,8 +9,7 @@ import math
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import AvSpec, HumanSpec, LaneletSpawn, PoseSpawn
+from crgame_ros.game.game import AvSpec, HumanSpec, LaneletSpawn, load_game, PoseSpawn
 from crgame_ros.game.objects import Role
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario, scenario_digest

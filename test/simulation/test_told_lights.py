@@ -7,7 +7,7 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.game.file import parse_game
+from crgame_ros.game.game import parse_game
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.registry import BUILT_IN, planner_class

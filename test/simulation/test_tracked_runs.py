@@ -11,8 +11,7 @@ from commonroad.planning.goal import GoalRegion
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import parse_game
-from crgame_ros.game.game import AvSpec, DrivabilitySpec, Game, ModelSpec
+from crgame_ros.game.game import AvSpec, DrivabilitySpec, Game, ModelSpec, parse_game
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.roads.route import start_lanelet

@@ -5,7 +5,7 @@
 from crgame_ros.traffic.lanes import pursuit
 from crgame_ros.traffic.motion.elastic_band import ElasticBand
 from crgame_ros.traffic.motion.passage import Obstacles
-from crgame_ros.vehicle.kinematic_single_track import integrate
+from crgame_ros.vehicle.models import integrate
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -13,7 +13,7 @@ from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.traffic.fleet.adoption import Adopted
 from crgame_ros.traffic.fleet.world_view import WorldView

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game, parse_game
+from crgame_ros.game.game import load_game, parse_game
 from crgame_ros.game.variation_spec import Dimension
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.schema.writing import write

@@ -4,7 +4,7 @@
 
 import math
 
-from crgame_ros.vehicle.kinematic_single_track import integrate
+from crgame_ros.vehicle.models import integrate
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -12,7 +12,7 @@ from crgame_ros.cockpit.replay_backend import ReplayBackend
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.judging import check_expectations, shortfalls
 from crgame_ros.game.expectation import Expectation
-from crgame_ros.game.file import parse_game
+from crgame_ros.game.game import parse_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.export_network import schema_errors
 from crgame_ros.schema.writing import write

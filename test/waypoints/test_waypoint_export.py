@@ -9,7 +9,7 @@ import re
 
 import commonroad
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario, parse_scenario

@@ -16,7 +16,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from crgame_ros.game.instruments_spec import GazeSpec
-from crgame_ros.recording.view_pictures import SeatPictures, ShownName
+from crgame_ros.recording.views import SeatPictures, ShownName
 import numpy as np
 from numpy.typing import NDArray
 import shapely

@@ -19,7 +19,7 @@ from crgame_ros.analysis.report.section import (
     table,
 )
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.recording.plan_outcome import PlanOutcome
+from crgame_ros.recording.recorded_plans import PlanOutcome
 from crgame_ros.timing.late_step import CAUSE_WORDS
 
 # Rows of table I: key of `timing.json`, label, unit, factor, digits.

@@ -11,8 +11,17 @@ from commonroad.scenario.traffic_light import TrafficLight
 from crgame_ros.analysis.behaviour.lane_visits import LaneVisits
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.roads.signals import governing_lights, INACTIVE, RED_STATES, TrafficLights
-from crgame_ros.roads.signs import has_arrow, has_stop_sign, lights_of, SIGN_REACH, stop_line_ends
+from crgame_ros.roads.signs import (
+    governing_lights,
+    has_arrow,
+    has_stop_sign,
+    INACTIVE,
+    lights_of,
+    RED_STATES,
+    SIGN_REACH,
+    stop_line_ends,
+    TrafficLights,
+)
 from crgame_ros.vehicle.state import STANDING, StateColumn
 import numpy as np
 from numpy.typing import NDArray

@@ -10,18 +10,16 @@ from pathlib import Path
 from typing import Any, Literal, Self, TYPE_CHECKING
 
 from crgame_ros.errors import CrgameError
-from crgame_ros.game.documents import GameDocument
-from crgame_ros.game.driven_vehicle import DrivenVehicle
+from crgame_ros.game.documents import DrivenVehicle, GameDocument
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.instrument_streams import read_streams, RecordedStream
-from crgame_ros.recording.offline_outcome import offline_outcome
-from crgame_ros.recording.plan_outcome import PlanOutcome, plans_of_report
 from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.recorded_plans import PlanOutcome, plans_of_report
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.run_folder import recording_in, run_name
 from crgame_ros.recording.run_record import record_of_log, run_record_of, RunRecord
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
-from crgame_ros.recording.timing_report import timing_report
+from crgame_ros.recording.timing_report import offline_outcome, timing_report
 from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
 from numpy.typing import NDArray

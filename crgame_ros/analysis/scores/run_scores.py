@@ -8,7 +8,7 @@ from typing import NamedTuple
 from crgame_ros.analysis.scores.scored_drives import score_drives
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.errors import CrgameError, one_line
-from crgame_ros.recording.plan_outcome import PlanOutcome
+from crgame_ros.recording.recorded_plans import PlanOutcome
 from crgame_ros.recording.run_record import RunRecord
 from shapely.errors import GEOSException
 

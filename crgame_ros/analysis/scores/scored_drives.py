@@ -12,7 +12,7 @@ from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import Role
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.recording.plan_outcome import PlanOutcome
+from crgame_ros.recording.recorded_plans import PlanOutcome
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario.loading import parse_scenario
 import numpy as np

@@ -17,7 +17,7 @@ from crgame_ros.analysis.scores.scored_drives import first_ends, score_drives
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_judge import SolutionJudge
 from crgame_ros.analysis.scores.vehicle import find_goal, PlannerScores, REMARKS, VehicleScores
-from crgame_ros.recording.plan_outcome import PlanOutcome
+from crgame_ros.recording.recorded_plans import PlanOutcome
 from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.recording.run_trajectories import RunTrajectories
 

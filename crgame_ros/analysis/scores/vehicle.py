@@ -13,7 +13,7 @@ from crgame_ros.analysis.scores.commonroad_costs import checker_version
 from crgame_ros.analysis.scores.driven_states import goal_step
 from crgame_ros.analysis.scores.measures import SCORE_MEASURES
 from crgame_ros.analysis.scores.nuplan import NuplanScore
-from crgame_ros.recording.plan_outcome import PlanOutcome
+from crgame_ros.recording.recorded_plans import PlanOutcome
 from crgame_ros.scenario.exact_values import group_outline
 import numpy as np
 import shapely

@@ -16,7 +16,7 @@ from crgame_ros.analysis.tables.column import (
     TableDeclaration,
     TEXT,
 )
-from crgame_ros.game.driven_vehicle import DrivenAv
+from crgame_ros.game.documents import DrivenAv
 from crgame_ros.planner.plan_check import check_plan
 from crgame_ros.recording.recorded_plans import RecordedPlan
 from crgame_ros.vehicle.state import StateColumn

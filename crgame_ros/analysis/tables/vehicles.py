@@ -25,7 +25,7 @@ from crgame_ros.analysis.tables.column import (
     TEXT,
 )
 from crgame_ros.analysis.tables.pairs import FOOTPRINTS, measure_column
-from crgame_ros.game.driven_vehicle import DrivenAv, DrivenHuman
+from crgame_ros.game.documents import DrivenAv, DrivenHuman
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 

@@ -12,7 +12,7 @@ import re
 
 from crgame_ros.cockpit.page_messages import clean_text
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, run_folder, run_folders
 

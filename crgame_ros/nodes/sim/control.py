@@ -12,8 +12,7 @@ from uuid import uuid4
 
 from crgame_ros.driver.source import is_replay
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import load_game
-from crgame_ros.game.game import Game, HumanSpec
+from crgame_ros.game.game import Game, HumanSpec, load_game
 from crgame_ros.game.seat_documents import SeatOccupant
 from crgame_ros.paths import default_game, scenarios_directory
 from crgame_ros.ros.endpoints import Endpoints

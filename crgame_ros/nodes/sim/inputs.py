@@ -23,7 +23,7 @@ from crgame_ros.simulation.setup import Setup
 from rclpy.node import Node
 
 if TYPE_CHECKING:  # Recordings are read in few runs, by code that takes time to load.
-    from crgame_ros.recording.recorded_inputs import RecordedInputs
+    from crgame_ros.recording.recorded_game import RecordedInputs
 
 # Triggers read at one tick: a flood must not cost the cycle.
 MAX_TRIGGERS = 10

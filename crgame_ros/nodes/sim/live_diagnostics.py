@@ -12,7 +12,7 @@ from crgame_ros.nodes.sim.outputs import SimOutputs
 from crgame_ros.ros.seats import Seat
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.engine import Simulation
-from crgame_ros.simulation.plan_status import plans_status, refusal_status
+from crgame_ros.simulation.run_messages import plans_status, refusal_status
 from diagnostic_msgs.msg import DiagnosticStatus
 
 # Refusals published as they happen, between two reports: a flood must not cost the cycle.

@@ -26,7 +26,7 @@ from crgame_ros.ros.seats import SeatSpells
 from crgame_ros.ros.spinning import serve
 from crgame_ros.simulation.autonomous_vehicle import BUSY_TIMEOUT_S
 from crgame_ros.simulation.engine import Simulation, StepResult
-from crgame_ros.simulation.plan_status import stop_reason, stop_status
+from crgame_ros.simulation.run_messages import stop_reason, stop_status
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.late_step import Phase
 from crgame_ros.timing.time_controller import TimeController
@@ -34,7 +34,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 if TYPE_CHECKING:  # Recordings are read in few runs, by code that takes time to load.
-    from crgame_ros.recording.recorded_inputs import RecordedInputs
+    from crgame_ros.recording.recorded_game import RecordedInputs
 
 NS_PER_S = 1_000_000_000
 # How often the executor looks for service calls [Hz], and the least time left for it [ns].

@@ -6,8 +6,13 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
-from crgame_ros.roads.signals import governing_lights, RED_STATES
-from crgame_ros.roads.signs import has_stop_sign, lights_of, stop_line_middle
+from crgame_ros.roads.signs import (
+    governing_lights,
+    has_stop_sign,
+    lights_of,
+    RED_STATES,
+    stop_line_middle,
+)
 from crgame_ros.traffic.compiling.compiled import compiled
 from crgame_ros.traffic.following.leaders import Ways
 from crgame_ros.traffic.lanes.lane_graph import FloatArray, IntArray, LaneGraph

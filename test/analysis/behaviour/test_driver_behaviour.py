@@ -12,11 +12,11 @@ from typing import Any
 from crgame_ros.analysis.behaviour.driver import DriverBehaviour, measure_behaviour
 from crgame_ros.analysis.behaviour.measures import MEASURES
 from crgame_ros.driver.source import ReplayDriver
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.recorded_game import recorded_inputs
 from crgame_ros.recording.run_record import run_record_of, RunRecord, SeatOrder
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup

@@ -9,7 +9,7 @@ from typing import Any
 from crgame_ros.analysis.behaviour.gaze import GazeSamples, looked_at, LookedAt, on_the_ground
 from crgame_ros.game.instruments_spec import GazeSpec
 from crgame_ros.game.view_documents import ShownThing, ViewEye, ViewPicture, ViewPlace
-from crgame_ros.recording.view_pictures import PictureKeeper
+from crgame_ros.recording.views import PictureKeeper
 import numpy as np
 import pytest
 import shapely

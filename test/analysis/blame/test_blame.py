@@ -11,7 +11,7 @@ from crgame_ros.analysis.blame.blame import Blame, blame_of
 from crgame_ros.analysis.blame.manoeuvres import BRAKING, Manoeuvre, MANOEUVRES
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.evaluation.results.cell_rows import vehicle_rows
-from crgame_ros.game.file import load_game, parse_game
+from crgame_ros.game.game import load_game, parse_game
 from crgame_ros.geometry.polyline import ReferencePath
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.occupancy.map_file import map_text

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.recorded_inputs import recorded_inputs
+from crgame_ros.recording.recorded_game import recorded_inputs
 from crgame_ros.recording.run_record import run_record_of, RunRecord
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.simulation.offline import run_offline

@@ -22,7 +22,7 @@ from commonroad.scenario.traffic_sign import TrafficSign, TrafficSignElement, Tr
 from crgame_ros.analysis.rules.passed_lines import DrivenTrack, LineRules, PassedLine
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
 from made_roads import made, Piece
 import numpy as np
