@@ -35,10 +35,7 @@ from commonroad.scenario.trajectory import Trajectory  # noqa: E402
 from continuous_motion import disagreement  # noqa: E402
 import crgame_ros  # noqa: E402
 from crgame_ros.errors import CrgameError  # noqa: E402
-from crgame_ros.game.game import (
-    Game,  # noqa: E402
-    parse_game,  # noqa: E402
-)
+from crgame_ros.game.game import Game, parse_game  # noqa: E402
 from crgame_ros.geometry.angles import wrap_pi_array  # noqa: E402
 from crgame_ros.schema.writing import write  # noqa: E402
 from crgame_ros.simulation.setup import build_setup  # noqa: E402

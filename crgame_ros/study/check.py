@@ -18,9 +18,13 @@ from crgame_ros.study.answer_condition import AnswerCondition, AnswerTest
 from crgame_ros.study.file import Break, DeviceCheck, Page, Questions, StudyFile
 from crgame_ros.study.followed_session import judged_by, judging_question
 from crgame_ros.study.local_text import LocalText
-from crgame_ros.study.pages import page_file, questionnaire_name, steps_of
 from crgame_ros.study.question import ChoiceQuestion, Question
-from crgame_ros.study.questionnaire import load_questionnaire
+from crgame_ros.study.questionnaire import (
+    load_questionnaire,
+    page_file,
+    questionnaire_name,
+    steps_of,
+)
 from crgame_ros.study.session_script import (
     drives_of,
     Fields,

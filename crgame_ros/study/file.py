@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The study file: participants, pages, questions and trials of an experiment."""
 
+import calendar
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
@@ -10,22 +12,58 @@ from crgame_ros.errors import InputError
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Folder, Keyed, Listed, Within, Wording
 from crgame_ros.schema.reading import read
+from crgame_ros.study.answer_condition import Exclusion
 from crgame_ros.study.elsewhere import Elsewhere
 from crgame_ros.study.groups import Groups
-from crgame_ros.study.local_text import LocalText, Text
-from crgame_ros.study.names import Name
+from crgame_ros.study.local_text import LocalText, Name, Text
 from crgame_ros.study.planned_analysis import PlannedAnalysis
 from crgame_ros.study.quality import QualityBounds
 from crgame_ros.study.question import check_conditions, Question
-from crgame_ros.study.retention import Retention
-from crgame_ros.study.screening import Exclusion
-from crgame_ros.study.staircase import Staircase
-from crgame_ros.study.success import StopRule, Success
+from crgame_ros.study.staircase import Staircase, StopRule, Success
 from crgame_ros.study.trial_order import OrderKind
 from crgame_ros.study.trial_settings import Factor, NOTHING, TrialSettings
 from crgame_ros.yaml_text import read_yaml
 
 _SEE = 'see docs/studies.md for the keys'
+
+
+@dataclass(frozen=True)
+class Retention:
+    """
+    The time for which a participant's data may be kept: one of two.
+
+    :param until: a date, the last day.
+    :param months: after the last entry of the participant's session.
+    """
+
+    FORM: ClassVar[Form] = Form('see docs/studies.md for the keys')
+
+    until: Annotated[str, Wording('[0-9]{4}-[0-9]{2}-[0-9]{2}',
+                                  'give a date such as 2030-12-31')] | None = None
+    months: Annotated[int, Within(1, 1200)] | None = None
+
+    def check(self) -> None:
+        """Refuse none or both, and a day that no calendar has."""
+        if (self.until is None) == (self.months is None):
+            raise InputError('has not one of "until" and "months"', '', 'give one of them')
+        try:
+            self.last_day(date.min)
+        except ValueError as error:
+            raise InputError(f'is {self.until}, which is no date', 'until',
+                             'give a date such as 2030-12-31') from error
+
+    def last_day(self, session: date) -> date:
+        """
+        Return the last day on which the data of a session may be kept.
+
+        :param session: day of its last entry.
+        """
+        if self.until is not None:
+            return date.fromisoformat(self.until)
+        months = session.year * 12 + session.month - 1 + (self.months or 0)
+        year, month = months // 12, months % 12 + 1
+        # A month after the 31st of January is the last of February.
+        return date(year, month, min(session.day, calendar.monthrange(year, month)[1]))
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell_scene import values_of_game
 from crgame_ros.evaluation.content import ContentStore, digests_in
 from crgame_ros.recording.run_folder import PARTICIPANTS, STUDY_FILE
-from crgame_ros.study.enrolment import enrolled, read_enrolment
 from crgame_ros.study.file import Page, Questions, StudyFile
-from crgame_ros.study.pages import steps_of
+from crgame_ros.study.groups import enrolled, read_enrolment
+from crgame_ros.study.questionnaire import steps_of
 from crgame_ros.study.session_journal import read_journal
 from crgame_ros.study.session_script import drives_of
 from crgame_ros.study.trial_game import trial_game

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Displayed texts in the languages of a study."""
+"""Names in a study, and displayed texts in its languages."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,9 +8,14 @@ from pathlib import Path
 from typing import Annotated
 
 from crgame_ros.errors import InputError, short
-from crgame_ros.schema.marks import Special
+from crgame_ros.schema.marks import Special, Wording
 
 MOST_CHARACTERS = 20_000
+# A column name in tables that R, SQL and pandas accept without quotes.
+ColumnName = Annotated[str, Wording('[a-z][a-z0-9_]{0,39}',
+                                    'begin with a letter a-z, then letters, digits and _')]
+Name = Annotated[str, Wording('[A-Za-z0-9][A-Za-z0-9_-]{0,39}',
+                              'give 1 to 40 letters, digits, - and _')]
 
 
 @dataclass(frozen=True)

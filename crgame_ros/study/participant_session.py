@@ -10,14 +10,25 @@ from types import TracebackType
 from typing import Any, Self
 
 from crgame_ros.errors import InputError
-from crgame_ros.study.enrolment import allocation_of, enrolled, enrolling, free_place
+from crgame_ros.study.answer_condition import Exclusion
 from crgame_ros.study.file import Page, StudyFile
-from crgame_ros.study.followed_session import followed, judging_question
-from crgame_ros.study.given_answers import exclusion_of, field_answers, last_answers
-from crgame_ros.study.groups import allocate, Allocation
-from crgame_ros.study.pages import questionnaire_of, questions_of
+from crgame_ros.study.followed_session import (
+    exclusion_of,
+    field_answers,
+    followed,
+    judging_question,
+    last_answers,
+)
+from crgame_ros.study.groups import (
+    allocate,
+    Allocation,
+    allocation_of,
+    enrolled,
+    enrolling,
+    free_place,
+)
 from crgame_ros.study.question import asked_of, check_answers, Question
-from crgame_ros.study.screening import Exclusion
+from crgame_ros.study.questionnaire import questionnaire_of, questions_of
 from crgame_ros.study.session_journal import SessionEvent, SessionJournal
 from crgame_ros.study.session_script import (
     Fields,

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 from crgame_ros.errors import InputError
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Within
-from crgame_ros.study.names import ColumnName
+from crgame_ros.study.local_text import ColumnName
 from crgame_ros.study.trial_settings import Factor
 
 _SEE = 'see docs/studies.md for the keys'

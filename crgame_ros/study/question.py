@@ -11,8 +11,7 @@ from crgame_ros.errors import InputError, short
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Advice, Keyed, Listed, Within
 from crgame_ros.study.answer_condition import AnswerCondition, holds_for, is_one_of
-from crgame_ros.study.local_text import LocalText, Text
-from crgame_ros.study.names import ColumnName
+from crgame_ros.study.local_text import ColumnName, LocalText, Text
 
 _SEE = 'see docs/studies.md for the keys'
 MOST_CHARACTERS = 20_000

@@ -14,8 +14,7 @@ from crgame_ros.game.instruments_spec import InstrumentsSpec
 from crgame_ros.game.task_spec import TaskList, TaskSpec
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Named, Within, Wording
-from crgame_ros.study.local_text import LocalText
-from crgame_ros.study.names import ColumnName, Name
+from crgame_ros.study.local_text import ColumnName, LocalText, Name
 
 _SEE = 'see docs/studies.md for the keys'
 

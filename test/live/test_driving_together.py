@@ -14,7 +14,7 @@ from crgame_ros.analysis.runs.run import Run
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.schema.reading import read
 from crgame_ros.study.conduct.live_drives import LiveDrives
-from crgame_ros.study.drive_state import DrivePhase
+from crgame_ros.study.drive_watch import DrivePhase
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_journal import read_journal

@@ -16,7 +16,7 @@ from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.schema.reading import read
 from crgame_ros.study.conduct.live_drives import LiveDrives
-from crgame_ros.study.drive_state import DrivePhase
+from crgame_ros.study.drive_watch import DrivePhase
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_journal import read_journal

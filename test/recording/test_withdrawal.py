@@ -9,8 +9,8 @@ import subprocess
 import sys
 
 from crgame_ros.cli import main
-from crgame_ros.study.enrolment import free_place
 from crgame_ros.study.folder import WITHDRAWALS
+from crgame_ros.study.groups import free_place
 from crgame_ros.study.session_journal import SessionJournal
 from personal_files import unlisted_files
 import polars

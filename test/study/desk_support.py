@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.study.drive_state import DrivePhase, DriveState
+from crgame_ros.study.drive_watch import DrivePhase, DriveState
 from crgame_ros.study.file import load_study, StudyFile
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_script import is_driven, PracticeDrives

@@ -12,7 +12,7 @@ from crgame_ros.paths import page_directory
 from crgame_ros.study.desk.messages import Finish, Note, parse_experimenter, parse_participant
 from crgame_ros.study.desk.page_markdown import picture, read_tree
 from crgame_ros.study.desk.pages import languages_of, WORDS, words_of
-from crgame_ros.study.drive_state import DrivePhase, DriveWork
+from crgame_ros.study.drive_watch import DrivePhase, DriveWork
 from crgame_ros.study.file import Page
 from crgame_ros.study.quality import PAGE, TIMING
 from crgame_ros.study.session_journal import SessionEvent

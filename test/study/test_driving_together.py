@@ -10,11 +10,11 @@ import sys
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.conduct.rider import Rider
-from crgame_ros.study.data.participant_record import read_participant
+from crgame_ros.study.data.conducted_study import read_participant
 from crgame_ros.study.data.withdrawal import Withdrawal
 from crgame_ros.study.desk.desk import Desk
 from crgame_ros.study.desk.participant_document import experimenter_document, participant_document
-from crgame_ros.study.drive_state import DrivePhase, DriveState
+from crgame_ros.study.drive_watch import DrivePhase, DriveState
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_journal import JOURNAL

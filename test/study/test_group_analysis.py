@@ -10,14 +10,15 @@ from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
 from crgame_ros.study.analysis.mixed_model import fit_model, model_formulas
-from crgame_ros.study.analysis.power import power_lines, power_of
-from crgame_ros.study.analysis.r_script import r_script
-from crgame_ros.study.analysis.simulated_trials import (
+from crgame_ros.study.analysis.planned_tests import unpaired_test
+from crgame_ros.study.analysis.power import (
     measure_models,
     planned_people,
+    power_lines,
+    power_of,
     SimulatedTrials,
 )
-from crgame_ros.study.analysis.unpaired_test import unpaired_test
+from crgame_ros.study.analysis.r_script import r_script
 from crgame_ros.study.file import StudyFile
 import numpy as np
 import polars

@@ -15,9 +15,8 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
-from crgame_ros.study.enrolment import enrolled
 from crgame_ros.study.file import StudyFile
-from crgame_ros.study.groups import allocate, Allocation, Groups
+from crgame_ros.study.groups import allocate, Allocation, enrolled, Groups
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_journal import JOURNAL, read_journal, SessionJournal
 from crgame_ros.study.session_script import drives_of, session_of

@@ -10,8 +10,7 @@ from typing import Any
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
 from crgame_ros.study.analysis.mixed_model import fit_model, model_formulas
-from crgame_ros.study.analysis.paired_test import holm, paired_test
-from crgame_ros.study.analysis.planned_tests import planned_tests
+from crgame_ros.study.analysis.planned_tests import holm, paired_test, planned_tests
 from crgame_ros.study.file import StudyFile
 import numpy as np
 import pytest

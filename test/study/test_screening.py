@@ -12,9 +12,8 @@ from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.recording.run_folder import STUDY_FILE
 from crgame_ros.study.data.conducted_study import ConductedStudy
-from crgame_ros.study.data.participant_flow import participant_flow
 from crgame_ros.study.data.study_data import read_study_data, StudyData
-from crgame_ros.study.data.study_report import study_html
+from crgame_ros.study.data.study_report import participant_flow, study_html
 from crgame_ros.study.desk.desk import Desk
 from crgame_ros.study.desk.participant_document import experimenter_document, participant_document
 from crgame_ros.study.file import load_study, Page, StudyFile

@@ -16,14 +16,9 @@ from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
 from crgame_ros.study.analysis.mixed_model import model_formulas
 from crgame_ros.study.analysis.planned_tests import used_rows
-from crgame_ros.study.analysis.simulated_trials import (
-    measure_models,
-    planned_people,
-    SimulatedTrials,
-)
+from crgame_ros.study.analysis.power import measure_models, planned_people, SimulatedTrials
 from crgame_ros.study.check import check_study
-from crgame_ros.study.data.conducted_study import ConductedStudy
-from crgame_ros.study.data.participant_record import read_participant
+from crgame_ros.study.data.conducted_study import ConductedStudy, read_participant
 from crgame_ros.study.desk.desk import Desk
 from crgame_ros.study.desk.participant_document import experimenter_document, participant_document
 from crgame_ros.study.file import load_study, StudyFile

@@ -9,12 +9,12 @@ import sys
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.study.data.participant_record import read_participant
+from crgame_ros.study.data.conducted_study import read_participant
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_journal import JOURNAL
 from crgame_ros.study.session_script import is_driven
-from crgame_ros.study.success import StopRule, Success
+from crgame_ros.study.staircase import StopRule, Success
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))

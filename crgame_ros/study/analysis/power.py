@@ -1,18 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Computes the power of a study's planned tests by simulation of the whole plan."""
+"""Computes the power of a study's planned tests by simulated trials of the whole plan."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+import math
+from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.analysis.planned_tests import planned_tests
-from crgame_ros.study.analysis.simulated_trials import (
-    measure_models,
-    planned_people,
-    SimulatedTrials,
-)
 from crgame_ros.study.file import StudyFile
+from crgame_ros.study.planned_analysis import Comparison
+from crgame_ros.study.trial_plan import plan_trials, PlannedTrial
 import numpy as np
 
 # The power that a number of participants is to reach.
@@ -106,3 +106,188 @@ def power_lines(powers: Sequence[Sequence[Power]], runs: int) -> Iterator[str]:
         f'None of these numbers reaches a power of {WANTED:g} in every test.' if found is None
         else f'{found} participants are the fewest of these with a power of {WANTED:g} in every '
         'test.')
+
+
+@dataclass(frozen=True)
+class SimulatedPerson:
+    """
+    A participant of a simulated study.
+
+    :param id: of the participant.
+    :param place: in the orders, of the group if there are groups, from 0 on.
+    :param group: of the participant; empty in a study without groups.
+    """
+
+    id: str  # noqa: A003
+    place: int
+    group: str = ''
+
+
+def planned_people(study: StudyFile, count: int) -> list[SimulatedPerson]:
+    """Return the first participants of a study, whose groups come in turn."""
+    groups = study.group_names
+    return [SimulatedPerson(f'P{number + 1:02}', number // len(groups),
+                            groups[number % len(groups)]) for number in range(count)]
+
+
+def compared_trials(study: StudyFile, place: int, group: str) -> tuple[PlannedTrial, ...]:
+    """Return the planned trials of a participant that comparisons use: none of staircases."""
+    return tuple(trial for trial in plan_trials(study, place, group) if trial.staircase is None)
+
+
+@dataclass(frozen=True)
+class MeasureModel:
+    """
+    The model of a measure: a mean of 0, effects of levels, an intercept of each participant.
+
+    :param trial_sd: standard deviation of the trials of a participant in one condition.
+    :param participant_sd: that of the participants' intercepts; no test within participants
+        depends on it.
+    :param effects: what a level, or a group, adds, by factor and level; others add nothing.
+    """
+
+    trial_sd: float
+    participant_sd: float
+    effects: dict[tuple[str, str], float]
+
+
+def measure_models(study: StudyFile, effects: bool = True) -> dict[str, MeasureModel]:
+    """
+    Return the model of each planned measure.
+
+    An effect in standard deviations of the participants' differences is turned into one of
+    trials by the numbers of trials of the first participant: the variance of a difference of
+    means of a and b trials is that of a trial times (1 / a + 1 / b). The variance of the
+    participants' means in a group is that of the intercepts, and of a trial over the number of
+    trials. Where the plan does not state both, the intercepts vary as trials do.
+
+    :param effects: whether levels have the effects that the plan states, or none.
+    :raises InputError: if the comparisons of a measure state different standard deviations.
+    """
+    trials = compared_trials(study, 0, study.group_names[0])
+    models: dict[str, MeasureModel] = {}
+    measures = dict.fromkeys(each.measure for each in study.analysis.comparisons)
+    for measure in measures:
+        of_measure = [(number, each) for number, each in enumerate(study.analysis.comparisons)
+                      if each.measure == measure]
+        within = _stated(of_measure, measure, lambda each: None if each.factor == study.between
+                         else _trial_sd(study, each, trials), 'of a trial')
+        between = _stated(of_measure, measure, lambda each: each.sd
+                          if each.factor == study.between else None, 'in a group')
+        trial_sd, participant_sd = _sds(within, between, len(trials), measure)
+        group_sd = math.hypot(participant_sd, trial_sd / math.sqrt(max(1, len(trials))))
+        added: dict[tuple[str, str], float] = {}
+        for _, each in of_measure if effects else ():
+            if each.effect is not None:
+                second = _pair(study, each)[1]
+                unit = 1.0 if each.sd is not None else group_sd \
+                    if each.factor == study.between else trial_sd * _root(study, each, trials)
+                key = each.factor, second
+                added[key] = added.get(key, 0.0) + each.effect * unit
+        models[measure] = MeasureModel(trial_sd, participant_sd, added)
+    return models
+
+
+def _stated(comparisons: list[tuple[int, Comparison]], measure: str,
+            sd_of: Callable[[Comparison], float | None], what: str) -> float | None:
+    """
+    Return the one standard deviation that comparisons state; None if they state none.
+
+    :raises InputError: if they state different ones.
+    """
+    known = {number: sd for number, each in comparisons if (sd := sd_of(each)) is not None}
+    first = next(iter(known.values()), None)
+    for number, sd in known.items():
+        if first is not None and not math.isclose(sd, first, rel_tol=1e-6):
+            raise InputError(f'states another standard deviation of {measure} than before: '
+                             f'{sd:.4g} {what}, not {first:.4g}',
+                             f'analysis: comparisons[{number}]: sd', 'state the same')
+    return first
+
+
+def _sds(trial_sd: float | None, group_sd: float | None, trials: int,
+         measure: str) -> tuple[float, float]:
+    """
+    Return the standard deviations of a participant's trials, and of the intercepts.
+
+    :param group_sd: of the participants' means in a group.
+    :param trials: number of trials of a participant.
+    """
+    if group_sd is None:
+        return trial_sd or 1.0, trial_sd or 1.0
+    if trial_sd is None:
+        trial_sd = group_sd / math.sqrt(1.0 + 1.0 / trials)
+        return trial_sd, trial_sd
+    left = group_sd ** 2 - trial_sd ** 2 / trials
+    if left < 0.0:
+        raise InputError(f'states that participants differ in {measure} by {group_sd:.4g}, which '
+                         f'is less than their own {trials} trials let them, '
+                         f'{trial_sd / math.sqrt(trials):.4g}', 'analysis: comparisons',
+                         'state a greater "sd" between groups')
+    return trial_sd, math.sqrt(left)
+
+
+def _trial_sd(study: StudyFile, comparison: Comparison,
+              trials: tuple[PlannedTrial, ...]) -> float | None:
+    if comparison.sd is None or comparison.sd_of == 'trial':
+        return comparison.sd
+    return comparison.sd / _root(study, comparison, trials)
+
+
+def _root(study: StudyFile, comparison: Comparison, trials: tuple[PlannedTrial, ...]) -> float:
+    """Return the standard deviation of a difference of means over that of a trial."""
+    counts = Counter(dict(_levels(trial)).get(comparison.factor) for trial in trials)
+    return math.sqrt(sum(1.0 / max(1, counts[level]) for level in _pair(study, comparison)))
+
+
+def _pair(study: StudyFile, comparison: Comparison) -> tuple[str, str]:
+    return comparison.pairs(next(factor for factor in study.all_factors
+                                 if factor.name == comparison.factor))[0]
+
+
+def _levels(trial: PlannedTrial) -> tuple[tuple[str, str], ...]:
+    return tuple((factor, level.name) for factor, level in trial.condition.levels)
+
+
+class SimulatedTrials:
+    """
+    The trials of some participants, whose measures can be drawn again and again.
+
+    :param study: their study.
+    :param people: the participants.
+    :param models: of the measures.
+    :ivar measures: names of the measures.
+    :ivar rows: one for each trial, as the table of trials has them.
+    """
+
+    def __init__(self, study: StudyFile, people: Sequence[SimulatedPerson],
+                 models: dict[str, MeasureModel]) -> None:
+        self._models = models
+        self.measures = tuple(models)
+        planned = [(number, _grouped(study, person, trial)) for number, person in enumerate(people)
+                   for trial in compared_trials(study, person.place, person.group)]
+        self.rows: list[dict[str, Any]] = [
+            {'participant': people[number].id, 'trial': trial.number, 'block': trial.block,
+             **levels} for number, (trial, levels) in planned]
+        self._people = np.array([number for number, _ in planned], dtype=np.intp)
+        self._count = len(people)
+        self._fixed = {measure: np.array([
+            sum(model.effects.get(level, 0.0) for level in levels.items())
+            for _, (_, levels) in planned]) for measure, model in models.items()}
+
+    def draw(self, rng: np.random.Generator) -> list[dict[str, Any]]:
+        """Draw all measures of all trials; return the rows, which the next draw overwrites."""
+        for measure, model in self._models.items():
+            intercepts = rng.normal(0.0, model.participant_sd, self._count)
+            values = self._fixed[measure] + intercepts[self._people] \
+                + rng.normal(0.0, model.trial_sd, len(self.rows))
+            for row, value in zip(self.rows, values.tolist(), strict=True):
+                row[measure] = value
+        return self.rows
+
+
+def _grouped(study: StudyFile, person: SimulatedPerson,
+             trial: PlannedTrial) -> tuple[PlannedTrial, dict[str, str]]:
+    """Return a trial with its levels by factor, that of the group among them."""
+    between = {} if study.between is None else {study.between: person.group}
+    return trial, {**dict(_levels(trial)), **between}

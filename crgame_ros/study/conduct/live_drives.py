@@ -11,8 +11,6 @@ import time
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, run_folder
-from crgame_ros.study.conduct.cockpit_links import make_links
-from crgame_ros.study.conduct.director import Director
 from crgame_ros.study.conduct.rider import Rider
 from crgame_ros.study.conduct.study_drive import (
     clean_s,
@@ -23,9 +21,8 @@ from crgame_ros.study.conduct.study_drive import (
     StudyDrive,
     write_drive,
 )
-from crgame_ros.study.conduct.study_graph import StudyGraph
-from crgame_ros.study.drive_state import DrivePhase, DriveState, DriveWork
-from crgame_ros.study.drive_watch import DriveWatch
+from crgame_ros.study.conduct.study_graph import Director, make_links, StudyGraph
+from crgame_ros.study.drive_watch import DrivePhase, DriveState, DriveWatch, DriveWork
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_script import is_driven, PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial

@@ -107,8 +107,8 @@ def check_planned_measures(study: Any) -> None:
 
     :raises InputError: naming the comparison.
     """
-    from crgame_ros.study.data.analysis_method import check_measures
     from crgame_ros.study.data.asked_questions import AskedQuestions
+    from crgame_ros.study.data.preregistration import check_measures
     from crgame_ros.study.data.trials_table import declare_trials
     if study.analysis.comparisons:
         check_measures(study, declare_trials(study, AskedQuestions(study))[1].columns)

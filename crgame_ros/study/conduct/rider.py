@@ -7,8 +7,7 @@ from dataclasses import replace
 import secrets
 from typing import Any, Protocol
 
-from crgame_ros.study.drive_state import DrivePhase, DriveState
-from crgame_ros.study.drive_watch import DriveWatch
+from crgame_ros.study.drive_watch import DrivePhase, DriveState, DriveWatch
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.quality import Excess, PAGE, TIMING
 from crgame_ros.study.session_journal import SessionEvent

@@ -15,8 +15,7 @@ from crgame_ros.study.data.study_row_table import (
     unlike,
 )
 from crgame_ros.study.file import Questions, StudyFile
-from crgame_ros.study.pages import questionnaire_name
-from crgame_ros.study.questionnaire import load_questionnaire, Questionnaire
+from crgame_ros.study.questionnaire import load_questionnaire, Questionnaire, questionnaire_name
 from crgame_ros.study.session_script import session_of, SessionItem
 
 

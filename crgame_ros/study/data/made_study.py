@@ -10,7 +10,7 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.software import software_with_commit
-from crgame_ros.study.analysis.simulated_trials import (
+from crgame_ros.study.analysis.power import (
     measure_models,
     planned_people,
     SimulatedPerson,
@@ -28,7 +28,7 @@ from crgame_ros.study.question import (
     VasQuestion,
 )
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
-from crgame_ros.study.success import OUTCOMES
+from crgame_ros.study.staircase import OUTCOMES
 from crgame_ros.study.trial_plan import PlannedTrial
 from crgame_ros.whole_file import write_text
 import numpy as np

@@ -7,10 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from crgame_ros.analysis.report.section import free, note, NOTHING, number, plain, table
 from crgame_ros.errors import InputError
 from crgame_ros.study.analysis.mixed_model import fit_models, missing_extra, MixedModel
-from crgame_ros.study.analysis.paired_test import PairedTest
-from crgame_ros.study.analysis.planned_tests import planned_tests, PlannedTest, used_rows
-from crgame_ros.study.analysis.unpaired_test import UnpairedTest
-from crgame_ros.study.data.analysis_method import check_measures, method_of
+from crgame_ros.study.analysis.planned_tests import (
+    PairedTest,
+    planned_tests,
+    PlannedTest,
+    UnpairedTest,
+    used_rows,
+)
+from crgame_ros.study.data.preregistration import check_measures, method_of
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.file import StudyFile
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDeclaration, TEXT
-from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
+from crgame_ros.study.data.conducted_study import ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.run_tables import RunTables
 from crgame_ros.study.data.trials_table import PARTICIPANT, utc, WALL
 from crgame_ros.study.session_journal import SessionEvent

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDeclaration, TEXT
-from crgame_ros.study.data.participant_record import ParticipantRecord
+from crgame_ros.study.data.conducted_study import ParticipantRecord
 from crgame_ros.study.data.study_row_table import plain_name, unlike
 from crgame_ros.study.data.trials_table import PARTICIPANT
 from crgame_ros.study.file import StudyFile

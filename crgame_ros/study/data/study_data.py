@@ -17,8 +17,12 @@ from crgame_ros.recording.finish import finish_run
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK
 from crgame_ros.study.data.asked_questions import AskedQuestions, plain_answer
-from crgame_ros.study.data.conducted_study import ConductedStudy
-from crgame_ros.study.data.participant_record import AnsweredItem, ParticipantRecord, TrialAttempt
+from crgame_ros.study.data.conducted_study import (
+    AnsweredItem,
+    ConductedStudy,
+    ParticipantRecord,
+    TrialAttempt,
+)
 from crgame_ros.study.data.run_tables import RunTables, RunTablesCache
 from crgame_ros.study.data.session_events_table import event_rows, EVENTS_OF_SESSIONS
 from crgame_ros.study.data.staircases_table import staircase_rows, StaircaseColumns, STAIRCASES

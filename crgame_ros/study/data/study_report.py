@@ -1,13 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the report of a study as one HTML file."""
+"""Writes the report of a study as one HTML file, with the flow of its participants."""
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from crgame_ros.analysis.report.document import Article, Page
 from crgame_ros.analysis.report.section import (
+    axis_ticks,
     free,
     marked,
     note,
@@ -16,13 +18,15 @@ from crgame_ros.analysis.report.section import (
     plain,
     Section,
     table,
+    tick_text,
 )
 from crgame_ros.study.data.condition_section import condition_section
+from crgame_ros.study.data.conducted_study import Part
 from crgame_ros.study.data.paper_section import paper_section
-from crgame_ros.study.data.participant_flow import flow_table
 from crgame_ros.study.data.planned_section import planned_section
-from crgame_ros.study.data.staircase_section import staircase_section
+from crgame_ros.study.data.staircases_table import counted_tracks, STAIRCASES
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
+from crgame_ros.study.staircase import StaircaseTrial, Track
 from crgame_ros.whole_file import write_text
 
 _STYLE = Path(__file__).resolve().parent / 'page' / 'study.css'
@@ -38,6 +42,13 @@ _TIMES = (('max_cumulative_error_s', 'greatest error [ms]', 1e3, 1),
           ('resets', 'drift resets', 1.0, 0), ('gaps', 'cycles lost', 1.0, 0),
           ('input_delay_s', 'input delay [ms]', 1e3, 1),
           ('link_delay_s', 'link delay [ms]', 1e3, 1))
+_PARTS: dict[Part, str] = {
+    'excluded': 'excluded', 'declined': 'did not give consent', 'ended': 'session ended early',
+    'under way': 'under way', 'completed': 'completed'}
+# Sizes of a plot, which is scaled as a whole [px].
+_WIDTH, _PLOT, _TOP, _BOTTOM, _LEFT = 560, 170, 12, 30, 52
+_ENDS = {'reversals': 'reversals', 'at_most': 'number of trials'}
+_WORDS = {True: 'success', False: 'failure', None: 'neither'}
 
 
 def write_study_report(data: StudyData, path: Path) -> None:
@@ -160,3 +171,127 @@ def _value(value: float | None, factor: float, digits: int) -> str:
 def _rows(data: StudyData, name: str) -> list[dict[str, Any]]:
     rows: list[dict[str, object]] = data.tables[name].to_pylist()
     return rows
+
+
+def participant_flow(data: StudyData) -> list[tuple[str, dict[str, int]]]:
+    """
+    Return the numbers of participants: began, dropped out and why, completed.
+
+    :return: words, and the number in each group by its name; an empty name stands for people
+        without a group.
+    """
+    flow: dict[str, Counter[str]] = {}
+
+    def count(words: str, group: str) -> None:
+        flow.setdefault(words, Counter())[group] += 1
+
+    rules = [record.exclusion['reason'] for record in data.records
+             if record.exclusion is not None]
+    # The order of the table.
+    for words in ('began', 'excluded', *(f'excluded: {rule}' for rule in dict.fromkeys(rules)),
+                  'did not give consent', 'session ended early', 'withdrew, data deleted',
+                  'under way', 'completed'):
+        flow[words] = Counter()
+    for record in data.records:
+        count('began', record.group)
+        count(_PARTS[record.part], record.group)
+        if record.exclusion is not None:
+            count(f'excluded: {record.exclusion["reason"]}', record.group)
+    for group in data.folder.withdrawn_groups:
+        count('began', group)
+        count('withdrew, data deleted', group)
+    return [(words, dict(counts)) for words, counts in flow.items()]
+
+
+def flow_table(data: StudyData) -> str:
+    """Return the table of the flow; a column for each group if the study has groups."""
+    flow = participant_flow(data)
+    groups = data.folder.study.groups
+    columns = () if groups is None else ('', *groups.names)
+    head = ('', 'participants', *(name or 'without a group' for name in columns))
+    return table('Flow of participants', tuple(map(plain, head)), [
+        (plain(words), number(sum(counts.values()), 0),
+         *(number(counts.get(name, 0), 0) for name in columns))
+        for words, counts in flow], 'numbers') + (note(
+            f'Groups by {plain(groups.told)}. Of those who dropped out, the place is free again.')
+            if groups is not None else '')
+
+
+def staircase_section(data: StudyData) -> str:
+    """Return the section."""
+    rules = {block.name: block.staircase.told for block in data.folder.study.blocks
+             if block.staircase is not None}
+    html = note('; '.join(f'{free(name)}: {plain(told)}' for name, told in rules.items()) + '.')
+    rows = [(free(row['participant']), free(row['block']), free(row['staircase']),
+             number(row['threshold'], 3), number(row['threshold_sd'], 3),
+             f'{row["reversals_used"]} of {row["reversals"]}', str(row['trials']),
+             str(row['steps_beyond']), plain(_ENDS.get(row['end'], NOTHING)))
+            for row in data.tables[STAIRCASES.name].to_pylist()]
+    if not rows:
+        return html + note('No staircase has begun yet.')
+    html += table('Thresholds', ('', 'block', 'staircase', 'threshold', 'SD', 'reversals used',
+                                 'trials', 'steps beyond the scale', 'ended by'), rows, 'numbers')
+    html += note('The threshold is the mean of the levels at the last even number of reversals, '
+                 'without those of first steps (Levitt 1971). In the tracks, a filled point is a '
+                 'success, a hollow one a failure; squares mark reversals, the broken line the '
+                 'threshold.')
+    return html + '<div class="plots">' + ''.join(
+        _figure(f'{record.id}, {block}' + (f': {name}' if name != 'all' else ''), track)
+        for record in data.records for (block, name), track in counted_tracks(record).items()
+        if track.judged) + '</div>'
+
+
+def _figure(words: str, track: Track) -> str:
+    return f'<figure class="chart"><figcaption>{plain(words)}</figcaption>' \
+        f'{track_svg(track, words)}</figure>'
+
+
+def track_svg(track: Track, words: str) -> str:
+    """
+    Draw the levels of a track's trials, as SVG.
+
+    :param words: alternative text of the plot.
+    """
+    trials = [(index, trial) for index, trial in enumerate(track.trials) if trial.done]
+    # The whole scale, so that tracks can be compared.
+    ticks = axis_ticks(track.numbers, 5)
+    low, high = ticks[0], ticks[-1]
+    count = max(2, len(trials))
+
+    def y(value: float) -> float:
+        return _TOP + (high - value) / (high - low) * _PLOT
+
+    def x(place: int) -> float:
+        return _LEFT + 12 + (place / (count - 1)) * (_WIDTH - _LEFT - 24)
+
+    marks = [f'<line class="grid" x1="{_LEFT}" x2="{_WIDTH}" y1="{y(tick):.1f}" '
+             f'y2="{y(tick):.1f}"/><text class="tick" x="{_LEFT - 6}" y="{y(tick) + 4:.1f}">'
+             f'{tick_text(tick)}</text>' for tick in ticks]
+    marks += [f'<text class="trial" x="{x(place):.1f}" y="{_TOP + _PLOT + 22}">{place + 1}</text>'
+              for place in sorted({0, len(trials) - 1})]
+    threshold = track.threshold
+    if threshold is not None:
+        marks.append(f'<line class="threshold" x1="{_LEFT}" x2="{_WIDTH}" '
+                     f'y1="{y(threshold.mean):.1f}" y2="{y(threshold.mean):.1f}"/>')
+    marks += _points(track, trials, x, y)
+    told = f'{words}: {len(track.judged)} trials, {len(track.reversals)} reversals' + (
+        '' if threshold is None else f', threshold {number(threshold.mean, 3)}')
+    return (f'<svg class="track" viewBox="0 0 {_WIDTH} {_TOP + _PLOT + _BOTTOM}" role="img" '
+            f'aria-label="{plain(told)}">{"".join(marks)}</svg>')
+
+
+def _points(track: Track, trials: Sequence[tuple[int, StaircaseTrial]],
+            x: Callable[[int], float], y: Callable[[float], float]) -> list[str]:
+    """Draw the trials, and the line through them."""
+    line = ' '.join(f'{x(place):.1f},{y(track.value_of(trial)):.1f}'
+                    for place, (_, trial) in enumerate(trials))
+    marks = [f'<polyline points="{line}"/>']
+    for place, (index, trial) in enumerate(trials):
+        at_x, at_y, word = x(place), y(track.value_of(trial)), _WORDS[trial.success]
+        reversal = index in track.reversals
+        if reversal:
+            marks.append(f'<rect x="{at_x - 8:.1f}" y="{at_y - 8:.1f}" width="16" height="16"/>')
+        marks.append(f'<circle class="{word}" cx="{at_x:.1f}" cy="{at_y:.1f}" r="4">'
+                     f'<title>trial {trial.place} of the block: {word}'
+                     f'{", reversal" if reversal else ""}</title></circle>')
+    return marks

@@ -20,8 +20,7 @@ from crgame_ros.analysis.tables.runs import RUNS
 from crgame_ros.analysis.tables.vehicles import VEHICLES
 from crgame_ros.errors import InputError
 from crgame_ros.study.data.asked_questions import AskedQuestions
-from crgame_ros.study.data.conducted_study import ConductedStudy
-from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
+from crgame_ros.study.data.conducted_study import ConductedStudy, ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.run_tables import RunTables
 from crgame_ros.study.data.study_row_table import flag_column, unlike, with_unit
 from crgame_ros.study.file import StudyFile

@@ -31,8 +31,8 @@ from crgame_ros.study.data.study_data_folder import (
 from crgame_ros.study.data.study_report import write_study_report
 from crgame_ros.study.data.study_rerun import RERUN
 from crgame_ros.study.elsewhere import PRIVATE
-from crgame_ros.study.enrolment import read_enrolment
 from crgame_ros.study.folder import MADE, WITHDRAWALS, WITHDRAWING
+from crgame_ros.study.groups import read_enrolment
 from crgame_ros.study.session_journal import JOURNAL, read_journal, SessionEvent
 from crgame_ros.whole_file import sync_folder, write_text
 import pyarrow as pa

@@ -11,10 +11,10 @@ import time
 from typing import Protocol
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.study.drive_state import DrivePhase, DriveState
+from crgame_ros.study.drive_watch import DrivePhase, DriveState
 from crgame_ros.study.file import Break, Page
-from crgame_ros.study.pages import consent_of
 from crgame_ros.study.participant_session import ParticipantSession
+from crgame_ros.study.questionnaire import consent_of
 from crgame_ros.study.session_journal import DECLINED, SessionEvent
 from crgame_ros.study.session_script import is_driven
 

@@ -11,9 +11,8 @@ from typing import Any
 from crgame_ros.study.answer_condition import AnswerCondition, holds_for
 from crgame_ros.study.desk.desk import Desk, UNDER_WAY
 from crgame_ros.study.desk.page_markdown import read_tree
-from crgame_ros.study.drive_state import DrivePhase
+from crgame_ros.study.drive_watch import DrivePhase
 from crgame_ros.study.file import Break, DeviceCheck, Page, Questions
-from crgame_ros.study.pages import questionnaire_name
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.quality import Excess, PAGE, QualityBounds, TIMING
 from crgame_ros.study.question import (
@@ -25,7 +24,7 @@ from crgame_ros.study.question import (
     TextQuestion,
     VasQuestion,
 )
-from crgame_ros.study.questionnaire import load_questionnaire
+from crgame_ros.study.questionnaire import load_questionnaire, questionnaire_name
 from crgame_ros.study.session_journal import DECLINED, SessionEvent
 from crgame_ros.study.session_script import Fields, is_driven, PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial

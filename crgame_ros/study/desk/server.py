@@ -30,10 +30,9 @@ from crgame_ros.cockpit.rights import Invitations
 from crgame_ros.cockpit.server import listen
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.paths import page_directory
-from crgame_ros.study.desk.consent_copy import consent_copy
 from crgame_ros.study.desk.desk import Desk
 from crgame_ros.study.desk.messages import MAX_BYTES, parse_experimenter, parse_participant
-from crgame_ros.study.desk.page_markdown import picture
+from crgame_ros.study.desk.page_markdown import consent_copy, picture
 from crgame_ros.study.desk.pages import DeskPages, TOLD_EVERY_S, words_of
 from crgame_ros.study.file import Page
 
