@@ -18,7 +18,7 @@ from pydantic import (
 )
 
 T = TypeVar('T')
-M = TypeVar('T', bound='Message')
+M = TypeVar('M', bound='Message')
 
 
 class JsonDocument(Generic[T]):
