@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from crgame_ros.python_interface.finished_run import Run
     from crgame_ros.python_interface.games import load_game
     from crgame_ros.python_interface.offline_runs import run
-    from crgame_ros.python_interface.recorded_runs import read_run, replay
-    from crgame_ros.python_interface.run_functions import export, measure, report
+    from crgame_ros.python_interface.recorded_runs import export, measure, read_run, replay, report
     from crgame_ros.version import __version__ as __version__  # noqa: F401
 else:
     # Hidden from type checkers, for which a name that is not imported above is then an error.

@@ -20,7 +20,7 @@ import sys
 
 from crgame_ros.analysis.tables.column import Column, TableDeclaration
 from crgame_ros.analysis.tables.run_tables import TABLES
-from crgame_ros.study.data.staircases_table import STAIRCASES
+from crgame_ros.study.data.session_tables import STAIRCASES
 
 DOCS = Path(__file__).resolve().parent.parent / 'docs'
 

@@ -32,8 +32,7 @@ from crgame_ros.library.lookup import find_scenarios
 from crgame_ros.planner.registry import create_planner, EXTERNAL
 from crgame_ros.schema.writing import write
 from crgame_ros.simulation.av_assignment import OWN
-from crgame_ros.variation.sampling import sample
-from crgame_ros.variation.space import space_of
+from crgame_ros.variation.space import sample, space_of
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,13 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.library.lookup import all_ids, index_of, scenario_of
-from crgame_ros.library.places import (
+from crgame_ros.library.lookup import (
+    all_ids,
     all_places,
     checked_place,
     drop_place,
+    index_of,
+    scenario_of,
     store_place,
     user_places,
     VARIABLE,

@@ -10,8 +10,14 @@ import sys
 import tarfile
 
 from crgame_ros.errors import InputError
-from crgame_ros.library.lookup import all_ids, find_scenario, find_scenarios, scenario_of
-from crgame_ros.library.places import drop_place, store_place
+from crgame_ros.library.lookup import (
+    all_ids,
+    drop_place,
+    find_scenario,
+    find_scenarios,
+    scenario_of,
+    store_place,
+)
 from crgame_ros.library.stored_index import MAX_BYTES
 import pytest
 

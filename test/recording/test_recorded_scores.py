@@ -13,9 +13,9 @@ from commonroad_dc.collision.collision_detection.pycrcc_collision_dispatch impor
 )
 from commonroad_dc.feasibility import solution_checker
 from crgame_ros.analysis.scores.commonroad_costs import COSTS
-from crgame_ros.analysis.scores.measures import SCORE_MEASURES
 from crgame_ros.analysis.scores.scored_run import score_run
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
+from crgame_ros.analysis.scores.vehicle import SCORE_MEASURES
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import load_game

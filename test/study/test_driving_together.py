@@ -9,7 +9,7 @@ from pathlib import Path
 import sys
 
 from crgame_ros.errors import InputError
-from crgame_ros.study.conduct.rider import Rider
+from crgame_ros.study.conduct.study_drive import Rider
 from crgame_ros.study.data.conducted_study import read_participant
 from crgame_ros.study.data.withdrawal import Withdrawal
 from crgame_ros.study.desk.desk import Desk

@@ -10,8 +10,7 @@ from crgame_ros.game.game import load_game, parse_game
 from crgame_ros.game.variation_spec import Dimension
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.schema.writing import write
-from crgame_ros.variation.sampling import sample
-from crgame_ros.variation.space import Axis, game_of, space_of, VariantSpace
+from crgame_ros.variation.space import Axis, game_of, sample, space_of, VariantSpace
 import numpy as np
 import pytest
 from scipy import stats

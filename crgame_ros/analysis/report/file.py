@@ -1,17 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the file of a report, completely or not at all."""
+"""Writes the file of a report on one run, or on several and their comparison."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
-from crgame_ros.analysis.criticality.criticality import MEASURES
-from crgame_ros.analysis.report.comparison import (
-    accepted,
-    comparison_section,
-    letter,
-    worst_of_all,
-)
+from crgame_ros.analysis.criticality.criticality import CHIEF, MEASURES
 from crgame_ros.analysis.report.document import Article, Page
 from crgame_ros.analysis.report.driving_section import (
     driving_section,
@@ -20,20 +15,41 @@ from crgame_ros.analysis.report.driving_section import (
     task_section,
 )
 from crgame_ros.analysis.report.outcome_section import criticality_section, outcome_section
-from crgame_ros.analysis.report.planners_section import planners_section
+from crgame_ros.analysis.report.planners_section import (
+    plan_section,
+    planners_compared,
+    planners_section,
+    timing_section,
+)
 from crgame_ros.analysis.report.run_section import began, run_section, software_note, title_of
-from crgame_ros.analysis.report.section import free, NOTHING, number, Section
-from crgame_ros.analysis.report.story_section import story_section
-from crgame_ros.analysis.report.timing_section import plan_section, timing_section
+from crgame_ros.analysis.report.section import (
+    Dash,
+    free,
+    marked,
+    NOTHING,
+    number,
+    Plot,
+    PlotLine,
+    Section,
+    share,
+    table,
+)
+from crgame_ros.analysis.report.story_section import moment, story_section
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.errors import InputError
 from crgame_ros.software import software
+from crgame_ros.vehicle.state import StateColumn
 from crgame_ros.whole_file import write_text
 
 # The sections of a run's report, in order; a new section is added here.
 SECTIONS: tuple[Callable[[Run], Section | None], ...] = (
     story_section, criticality_section, outcome_section, driving_section, task_section,
     planners_section, input_section, motion_section, plan_section, timing_section, run_section)
+# Colours distinguish runs, dashes the vehicles of a run.
+_COLOURS = ('human-0', 'av-0', 'av-2', 'human-2', 'human-1', 'av-1')
+_DASHES: tuple[Dash, ...] = ('solid', 'dash', 'dot')
+# More lines in one plot are unreadable.
+_MOST_LINES = 18
 
 
 def report_html(runs: Sequence[Run], software: str = '') -> str:
@@ -120,3 +136,97 @@ def check_report_runs(count: int) -> None:
     """Refuse a number of runs that is too large to compare."""
     if count > MOST_RUNS:
         raise InputError(f'{count} runs', 'report', f'give {MOST_RUNS} at most')
+
+
+def comparison_section(runs: Sequence[Run]) -> Section:
+    """Return the section that compares runs; letters identify them in plots."""
+    head = ('', *(f'{letter(i)}: {free(run.name)}' for i, run in enumerate(runs)))
+    rows = [(words, *(cell(run) for run in runs)) for words, cell in _rows()]
+    return Section('comparison', 'Comparison', table(
+        'The runs side by side; of measures the worst of all driven vehicles', head, rows,
+        'numbers comparison') + planners_compared(runs, [letter(i) for i in range(len(runs))]),
+        tuple(_plots(runs)))
+
+
+def letter(place: int) -> str:
+    """Return the letter of a run; after Z comes AA."""
+    first, last = divmod(place, 26)
+    return (letter(first - 1) if first else '') + chr(ord('A') + last)
+
+
+def _rows() -> Iterator[tuple[str, Callable[[Run], str]]]:
+    yield 'game', lambda run: free(title_of(run))
+    yield 'scenario', lambda run: free(run.log.game.benchmark_id)
+    yield 'drivers', lambda run: ', '.join(
+        f'{item.id} {free(item.driver)}' for item in run.log.game.humans) or NOTHING
+    yield 'planners', lambda run: ', '.join(
+        f'{item.id} {free(item.planner)}' for item in run.log.game.avs) or NOTHING
+    yield 'seed', lambda run: str(run.log.game.seed)
+    yield 'length [s]', lambda run: number(float(run.times_s[-1]), 1)
+    for name, measure in CHIEF.items():
+        yield measure.head, lambda run, name=name: worst_of_all(run, name)  # type: ignore[misc]
+    yield 'time below the threshold of TTC [s]', lambda run: number(sum(
+        each.exposures['tet_s'] for each in run.usual_criticality.report()))
+    yield 'least PET [s]', _least_pet
+    yield 'contacts', lambda run: NOTHING if run.contacts is None \
+        else str(len(run.contacts))
+    yield 'violations', lambda run: NOTHING if run.outcome is None \
+        else str(run.outcome['drivability']['violations'])
+    yield 'events that took effect', lambda run: str(len(run.record.fired))
+    yield 'plans accepted', accepted
+    yield 'worst latency p99 [ms]', _latency
+    yield 'greatest cumulative error [ms]', lambda run: _format_value(
+        run, lambda timing: number(timing['max_cumulative_error_ms'], 1))
+
+
+def worst_of_all(run: Run, name: str) -> str:
+    """Return the worst value of a measure over all vehicles of a run, linked to its moment."""
+    found = [each.worst[name] for each in run.usual_criticality.report() if name in each.worst]
+    if not found:
+        return NOTHING
+    sign = MEASURES[name].worst
+    worst = max(found, key=lambda each: sign * each.value)
+    critical = run.usual_criticality.thresholds.exceeded(name, worst.value)
+    return f'{marked(number(worst.value), critical)} <small>at {moment(run, worst.time_s)}</small>'
+
+
+def accepted(run: Run) -> str:
+    """Return the text on how many plans of all AVs were accepted, as the run's last line does."""
+    due = sum(found.due for found in run.answers.values())
+    driven = sum(found.driven for found in run.answers.values())
+    return f'{driven} of {due} ({share(driven, due)})' if due else NOTHING
+
+
+def _format_value(run: Run, say: Callable[[Any], str]) -> str:
+    return NOTHING if run.timing is None else say(run.timing)
+
+
+def _least_pet(run: Run) -> str:
+    found = [each for vehicle in run.usual_criticality.report() for each in vehicle.crossings]
+    if not found:
+        return NOTHING
+    least = min(found, key=lambda each: each.pet_s)
+    text = marked(number(least.pet_s), least.pet_s < run.usual_criticality.thresholds.pet_s)
+    return f'{text} <small>at {moment(run, least.entered_s)}</small>'
+
+
+def _latency(run: Run) -> str:
+    known = [found.latency_ms['p99'] for found in run.answers.values() if found.latency_ms]
+    return number(max(known), 1) if known else NOTHING
+
+
+def _plots(runs: Sequence[Run]) -> Iterator[Plot]:
+    yield _plot(runs, 'speed', 'Speed', 'm/s', lambda run, i: run.log.vehicle_states[
+        :, i, StateColumn.SPEED], None)
+    for name, words, bounds in (('ttc', 'Time to collision', (0.0, 10.0)),
+                                ('min_distance', 'Distance', None)):
+        yield _plot(runs, name.replace('_', '-'), words, MEASURES[name].symbol,
+                    lambda run, i, name=name: run.course[name][i], bounds)  # type: ignore[misc]
+
+
+def _plot(runs: Sequence[Run], key: str, words: str, unit: str,
+          values: Callable[[Run, int], Any], bounds: tuple[float, float] | None) -> Plot:
+    lines = [PlotLine(f'{letter(place)} {item.id}', run.times_s, values(run, i),
+                      _COLOURS[place % len(_COLOURS)], _DASHES[i % len(_DASHES)])
+             for place, run in enumerate(runs) for i, item in enumerate(run.log.vehicles)]
+    return Plot(key, words, unit, tuple(lines[:_MOST_LINES]), bounds=bounds)

@@ -11,8 +11,7 @@ from crgame_ros.analysis.criticality.headways import LEAST_SPEED, SHORT_S
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.analysis.scores.measures import SCORE_MEASURES
-from crgame_ros.analysis.scores.vehicle import VehicleScores
+from crgame_ros.analysis.scores.vehicle import SCORE_MEASURES, VehicleScores
 from crgame_ros.analysis.tables.behaviour import VEHICLE_BEHAVIOUR
 from crgame_ros.analysis.tables.column import (
     Column,

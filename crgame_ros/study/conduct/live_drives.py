@@ -11,13 +11,13 @@ import time
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, run_folder
-from crgame_ros.study.conduct.rider import Rider
 from crgame_ros.study.conduct.study_drive import (
     clean_s,
     cut_short,
     Disturbance,
     outcome_of,
     RESET,
+    Rider,
     StudyDrive,
     write_drive,
 )

@@ -21,7 +21,7 @@ from crgame_ros.analysis.tables.instruments import INSTRUMENT_CHANNELS, INSTRUME
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import prepare_folder
 from crgame_ros.study.data.conducted_study import ParticipantRecord
-from crgame_ros.study.data.session_events_table import drive_start_s, EVENTS_OF_SESSIONS
+from crgame_ros.study.data.session_tables import drive_start_s, EVENTS_OF_SESSIONS
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
 from crgame_ros.version import __version__
 from crgame_ros.whole_file import write_bytes, write_text

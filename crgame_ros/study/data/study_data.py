@@ -24,8 +24,13 @@ from crgame_ros.study.data.conducted_study import (
     TrialAttempt,
 )
 from crgame_ros.study.data.run_tables import RunTables, RunTablesCache
-from crgame_ros.study.data.session_events_table import event_rows, EVENTS_OF_SESSIONS
-from crgame_ros.study.data.staircases_table import staircase_rows, StaircaseColumns, STAIRCASES
+from crgame_ros.study.data.session_tables import (
+    event_rows,
+    EVENTS_OF_SESSIONS,
+    staircase_rows,
+    StaircaseColumns,
+    STAIRCASES,
+)
 from crgame_ros.study.data.study_row_table import (
     flag_column,
     question_column,

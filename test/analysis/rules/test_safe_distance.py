@@ -9,11 +9,7 @@ from pathlib import Path
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.headways import Following, Headways
-from crgame_ros.analysis.rules.safe_distance import (
-    safe_distance,
-    unsafe_distance,
-    UnsafeDistance,
-)
+from crgame_ros.analysis.rules.vehicle_rules import safe_distance, unsafe_distance, UnsafeDistance
 from crgame_ros.game.game import DrivabilitySpec
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
