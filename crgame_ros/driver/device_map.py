@@ -16,7 +16,7 @@ from crgame_ros.paths import config_directory
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, OnlyWith, Special, Within, Wording
 from crgame_ros.schema.reading import read
-from crgame_ros.vehicle.driver_command import Light
+from crgame_ros.vehicle.lights import Light
 from crgame_ros.yaml_text import parse_yaml, read_yaml
 from evdev import ecodes
 

@@ -7,7 +7,8 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
-from crgame_ros.vehicle.driver_command import DriverCommand, lights_of, RELEASED
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+from crgame_ros.vehicle.lights import lights_of
 
 
 class KeyState(NamedTuple):

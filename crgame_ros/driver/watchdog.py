@@ -7,7 +7,8 @@ import math
 
 from crgame_ros.driver.keyboard import KeyboardParameters
 from crgame_ros.errors import InputError
-from crgame_ros.vehicle.driver_command import DriverCommand, HAZARD, RELEASED
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+from crgame_ros.vehicle.lights import HAZARD
 from crgame_ros.vehicle.state import REST
 
 _RATES = KeyboardParameters()

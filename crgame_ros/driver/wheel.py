@@ -8,7 +8,8 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
-from crgame_ros.vehicle.driver_command import DriverCommand, HAZARD, Light
+from crgame_ros.vehicle.driver_command import DriverCommand
+from crgame_ros.vehicle.lights import HAZARD, Light
 
 # From linux/input-event-codes.h: the hat axes, and the first joystick button.
 HATS = range(0x10, 0x18)

@@ -38,7 +38,7 @@ from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.schema.document_marks import Bounded, Declared, Derived, Row
 from crgame_ros.schema.json_documents import JsonDocument
 from crgame_ros.schema.writing import write
-from crgame_ros.vehicle.driver_command import ALL_LIGHTS
+from crgame_ros.vehicle.lights import ALL_LIGHTS
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from crgame_ros.errors import InputError
-from crgame_ros.vehicle.driver_command import Light
+from crgame_ros.vehicle.lights import Light
 from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
 import numpy as np
 from numpy.typing import NDArray

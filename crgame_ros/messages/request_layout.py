@@ -16,7 +16,7 @@ from crgame_ros.messages.joints import (
     vehicle_joint_names,
     VEHICLE_JOINTS,
 )
-from crgame_ros.vehicle.driver_command import ALL_LIGHTS, Light
+from crgame_ros.vehicle.lights import ALL_LIGHTS, Light
 import numpy as np
 from numpy.typing import NDArray
 

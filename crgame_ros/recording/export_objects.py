@@ -28,7 +28,7 @@ from crgame_ros.scenario.export_document import (
 from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.obstacles import recorded_signals
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
-from crgame_ros.vehicle.driver_command import BRAKING, HAZARD, Light
+from crgame_ros.vehicle.lights import BRAKING, HAZARD, Light
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 import math
 
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.vehicle.driver_command import Light
+from crgame_ros.vehicle.lights import Light
 import numpy as np
 
 # A lanelet that bends by less than TURN at a fork goes straight on [rad]. The same holds for one

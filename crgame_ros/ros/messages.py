@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from builtin_interfaces.msg import Duration, Time
 from crgame_ros.errors import InputError
 from crgame_ros.messages.joints import JointSeries, MAP
-from crgame_ros.vehicle.driver_command import DriverCommand, Light, lights_of, OF_DRIVERS
+from crgame_ros.vehicle.driver_command import DriverCommand
+from crgame_ros.vehicle.lights import Light, lights_of, OF_DRIVERS
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import Joy

@@ -21,7 +21,7 @@ from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.exact_values import exact_position, exact_value, parts_of
 from crgame_ros.scenario.loading import LoadedScenario
-from crgame_ros.vehicle.driver_command import HAZARD, Light
+from crgame_ros.vehicle.lights import HAZARD, Light
 import numpy as np
 from numpy.typing import NDArray
 

@@ -14,7 +14,7 @@ from crgame_ros.roads.route import find_route, goal_lanelets, start_lanelet
 from crgame_ros.roads.turns import Turns
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.setup import Setup
-from crgame_ros.vehicle.driver_command import Light
+from crgame_ros.vehicle.lights import Light
 import numpy as np
 from numpy.typing import NDArray
 

@@ -13,7 +13,7 @@ from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.simulation.game_check import task_seat
 from crgame_ros.simulation.setup import Setup
-from crgame_ros.vehicle.driver_command import signals_document
+from crgame_ros.vehicle.lights import signals_document
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.steering import table_text
 

@@ -40,8 +40,6 @@ _OPEN = 1e-9
 _NAMES = ('id', 'name')
 _FUNCTIONS = {'abs': abs, 'min': min, 'max': max, 'sqrt': math.sqrt, 'round': round}
 _LONGEST = 500
-Points = NDArray[np.float64]
-
 # Points are drawn until enough keep the constraints, but no more than this many for each.
 _DRAWN = 1000
 
@@ -396,7 +394,7 @@ def sample(space: VariantSpace, sampling: Sampling, number: int, seed: int,
     return found[:number]
 
 
-def _points(sampling: Sampling, dimensions: int, seed: int) -> Callable[[int], Points]:
+def _points(sampling: Sampling, dimensions: int, seed: int) -> Callable[[int], NDArray[np.float64]]:
     """Return a source of points: called with their number, it returns (N, dimensions)."""
     # It takes a second to load, and not everyone who reads games draws points.
     from scipy.stats import qmc
@@ -405,7 +403,7 @@ def _points(sampling: Sampling, dimensions: int, seed: int) -> Callable[[int], P
         return lambda number: rng.random((number, dimensions))
     engine = {'sobol': qmc.Sobol, 'lhs': qmc.LatinHypercube}[sampling](dimensions, rng=seed)
 
-    def draw(number: int) -> Points:
-        points: Points = engine.random(number)
+    def draw(number: int) -> NDArray[np.float64]:
+        points: NDArray[np.float64] = engine.random(number)
         return points
     return draw

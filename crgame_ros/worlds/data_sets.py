@@ -35,7 +35,7 @@ from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.export_network import used_ids, write_roads
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.vehicle.driver_command import Light
+from crgame_ros.vehicle.lights import Light
 from crgame_ros.whole_file import write_text
 from crgame_ros.worlds.environments import converter_variables, DATA_SET_CONVERTER
 from crgame_ros.worlds.kinds import WorldKind

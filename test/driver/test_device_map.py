@@ -14,7 +14,7 @@ from crgame_ros.driver.device_map import (
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import joy_state, normalize, RawInput
 from crgame_ros.errors import InputError
-from crgame_ros.vehicle.driver_command import Light
+from crgame_ros.vehicle.lights import Light
 from evdev import ecodes
 import pytest
 

@@ -13,13 +13,8 @@ from crgame_ros.driver.timeline import parse_timeline, timeline_text
 from crgame_ros.driver.watchdog import SeatWatchdog
 from crgame_ros.driver.wheel import IndicatorLever, LightButtons
 from crgame_ros.errors import InputError
-from crgame_ros.vehicle.driver_command import (
-    DriverCommand,
-    HAZARD,
-    Light,
-    lights_of,
-    signals_document,
-)
+from crgame_ros.vehicle.driver_command import DriverCommand
+from crgame_ros.vehicle.lights import HAZARD, Light, lights_of, signals_document
 import numpy as np
 import pytest
 

@@ -3,7 +3,7 @@
 """Where made roads turn off: forks of long lanelets, roundabouts, merges, the opposite lane."""
 
 from crgame_ros.roads.turns import Turns
-from crgame_ros.vehicle.driver_command import Light
+from crgame_ros.vehicle.lights import Light
 from made_roads import made, Piece, WIDTH
 import pytest
 

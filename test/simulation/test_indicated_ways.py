@@ -9,7 +9,7 @@ from commonroad.scenario.state import CustomState, InitialState
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.turns import Turns
 from crgame_ros.simulation.plan_indicator import PlanIndicator
-from crgame_ros.vehicle.driver_command import Light
+from crgame_ros.vehicle.lights import Light
 from made_roads import made, Piece, WIDTH
 import numpy as np
 from numpy.typing import NDArray

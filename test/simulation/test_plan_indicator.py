@@ -14,7 +14,7 @@ from crgame_ros.roads.turns import Turns
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.plan_indicator import PlanIndicator
 from crgame_ros.simulation.setup import build_setup
-from crgame_ros.vehicle.driver_command import Light
+from crgame_ros.vehicle.lights import Light
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -11,7 +11,8 @@ from crgame_ros.messages.joints import plan_to_joints
 from crgame_ros.messages.plan import Plan
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.simulation.plan_indicator import PlanIndicator, PlanIndicators
-from crgame_ros.vehicle.driver_command import DriverCommand, Light
+from crgame_ros.vehicle.driver_command import DriverCommand
+from crgame_ros.vehicle.lights import Light
 import numpy as np
 import pytest
 import simulation_support as support

@@ -16,7 +16,8 @@ from crgame_ros.simulation.av_models import published_states
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.offline import OfflineResult, perceive, PlannerSeat, run_offline
 from crgame_ros.simulation.setup import build_setup, Setup
-from crgame_ros.vehicle.driver_command import DriverCommand, HAZARD, Light
+from crgame_ros.vehicle.driver_command import DriverCommand
+from crgame_ros.vehicle.lights import HAZARD, Light
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ import yaml
 
 COURTEOUS = '''
 from crgame_ros.planner.constant_velocity import ConstantVelocityPlanner
-from crgame_ros.vehicle.driver_command import Light
+from crgame_ros.vehicle.lights import Light
 
 
 class Courteous(ConstantVelocityPlanner):

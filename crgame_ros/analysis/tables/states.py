@@ -22,7 +22,7 @@ from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
-from crgame_ros.vehicle.driver_command import Light
+from crgame_ros.vehicle.lights import Light
 from crgame_ros.vehicle.state import pose_rates, STATE_WIDTH, StateColumn
 import numpy as np
 from numpy.typing import NDArray

@@ -21,7 +21,7 @@ from crgame_ros.nodes.markers.bodies import (
 from crgame_ros.nodes.markers.roads import light_positions, map_markers
 from crgame_ros.ros.messages import set_time
 from crgame_ros.ros.scenario_documents import ScenarioSet
-from crgame_ros.vehicle.driver_command import BRAKING, Light
+from crgame_ros.vehicle.lights import BRAKING, Light
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray
