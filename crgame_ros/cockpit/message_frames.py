@@ -139,8 +139,8 @@ class ScanFrame(NamedTuple):
     frame: bytes
 
 
-def scan_frame(place: Place, message: Any, mounts: SensorMounts,
-               columns: Mapping[str, int]) -> ScanFrame | None:
+def _scan_frame(place: Place, message: Any, mounts: SensorMounts,
+                columns: Mapping[str, int]) -> ScanFrame | None:
     """
     Read a sensor_msgs/LaserScan of a sensor of the game.
 
@@ -171,7 +171,7 @@ def scan_frame(place: Place, message: Any, mounts: SensorMounts,
         np.maximum(ranges, 0.0)))
 
 
-def estimate_frame(place: Place, column: int, message: Any) -> bytes:
+def _estimate_frame(place: Place, column: int, message: Any) -> bytes:
     """
     Read a nav_msgs/Odometry with an AV's estimated pose.
 
@@ -191,7 +191,7 @@ def estimate_frame(place: Place, column: int, message: Any) -> bytes:
     return frames.encode_estimate(*place, column, row)
 
 
-def occupancy_frame(place: Place, message: Any) -> bytes:
+def _occupancy_frame(place: Place, message: Any) -> bytes:
     """
     Read a nav_msgs/OccupancyGrid; a cell that is neither free nor occupied counts as free.
 
@@ -314,11 +314,11 @@ class MessageFrames:
     def estimate(self, place: Place, av: str, message: object) -> Frame:
         """Return the frame of an AV's pose estimate."""
         column = self.columns[av]
-        return Frame(f'estimate:{column}', estimate_frame(place, column, message))
+        return Frame(f'estimate:{column}', _estimate_frame(place, column, message))
 
     def scan(self, place: Place, av: str, message: object) -> Frame | None:
         """Return the frame of a scan; None if the AV lacks the sensor or its pose is unknown."""
-        scan = scan_frame(place, message, self.mounts, self.columns)
+        scan = _scan_frame(place, message, self.mounts, self.columns)
         if scan is None or scan.av != av:
             return None
         return Frame(f'scan:{scan.column}:{scan.sensor}', scan.frame)
@@ -342,7 +342,7 @@ class MessageFrames:
 
     def occupancy(self, place: Place, message: object) -> Frame:
         """Return the frame of the map of permanent obstacles, valid from a place on."""
-        return Frame('occupancy', occupancy_frame(place, message))
+        return Frame('occupancy', _occupancy_frame(place, message))
 
 
 def state_rows(states: FloatArray, commands: FloatArray | None) -> FloatArray:

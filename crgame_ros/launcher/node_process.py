@@ -83,7 +83,7 @@ class NodeProcess:
 
     def __init__(self, spec: NodeSpec, namespace: str = '/') -> None:
         self.spec = spec
-        self.pid, reading = fork_node(spec.module, spec.arguments(namespace), spec.nice)
+        self.pid, reading = _fork_node(spec.module, spec.arguments(namespace), spec.nice)
         self.output = os.fdopen(reading, 'rb', buffering=0)
         os.set_blocking(reading, False)
         self._code: int | None = None
@@ -154,7 +154,7 @@ def load(names: Sequence[str]) -> None:
     gc.freeze()
 
 
-def fork_node(module: str, arguments: Sequence[str], nice: int) -> tuple[int, int]:
+def _fork_node(module: str, arguments: Sequence[str], nice: int) -> tuple[int, int]:
     """
     Start a node in a process group of its own.
 

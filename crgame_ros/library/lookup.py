@@ -77,7 +77,7 @@ def find_scenarios(names: Sequence[str], base: Path = Path()) -> tuple[str, ...]
 
 def index_of(place: Path) -> Index:
     """Return the index of a folder or an archive."""
-    return FolderIndex(place) if place.is_dir() or not is_archive(place) else ArchiveIndex(place)
+    return FolderIndex(place) if place.is_dir() or not _is_archive(place) else ArchiveIndex(place)
 
 
 def scenario_of(benchmark_id: str) -> Path:
@@ -178,12 +178,12 @@ def _guess(benchmark_id: str, ids: Sequence[str]) -> str:
     return f'did you mean {", ".join(folded[name] for name in near)}? ' if near else ''
 
 
-def is_archive(path: Path) -> bool:
+def _is_archive(path: Path) -> bool:
     """Return whether a file's name is that of an archive."""
     return path.name.lower().endswith(ARCHIVES)
 
 
-def places_file() -> Path:
+def _places_file() -> Path:
     """Return the file that holds the user's places, one a line."""
     return user_directory('config') / 'scenarios.txt'
 
@@ -194,7 +194,7 @@ def user_places() -> tuple[Path, ...]:
 
     :raises InputError: if their file cannot be read.
     """
-    file = places_file()
+    file = _places_file()
     try:
         lines = file.read_text(encoding='utf-8').splitlines()
     except FileNotFoundError:
@@ -227,7 +227,7 @@ def checked_place(path: Path) -> Path:
     :raises InputError: if it is neither.
     """
     found = path.expanduser().absolute()
-    if '\n' in str(found) or not (found.is_dir() or found.is_file() and is_archive(found)):
+    if '\n' in str(found) or not (found.is_dir() or found.is_file() and _is_archive(found)):
         raise InputError('is neither a folder nor an archive' if found.exists()
                          else 'is not there', str(path),
                          f'name a folder of scenarios, or one of {", ".join(ARCHIVES)}')
@@ -263,6 +263,6 @@ def drop_place(path: Path) -> Path:
 
 
 def _write(places: tuple[Path, ...]) -> None:
-    file = places_file()
+    file = _places_file()
     make_folder(file.parent, 'set XDG_CONFIG_HOME to a folder that can be written')
     write_text(''.join(f'{place}\n' for place in places), file)

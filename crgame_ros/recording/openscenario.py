@@ -168,15 +168,15 @@ def _tracks(log: RunTrajectories, times_s: FloatArray,
     columns = np.flatnonzero(seen).tolist()
     found = []
     for column, driven in enumerate(log.game.vehicles):
-        entity = body_of(log.vehicles[column], driven.vehicle).entity
+        entity = _body_of(log.vehicles[column], driven.vehicle).entity
         found.append((_driven_track(driven.id, times_s, states[:, column]), entity))
     for column in columns:
         item, poses = log.objects[column], log.object_poses[:, column]
-        body = body_of(item, None)
+        body = _body_of(item, None)
         x, y, _ = log.object_velocities[0, column]
         speed = float(np.nan_to_num(x * np.cos(poses[0, 2]) + y * np.sin(poses[0, 2])))
         found.append((_Track(item.id, times_s, shifted(poses, body.ahead), speed), body.entity))
-    notices += body_notices([*log.vehicles, *(log.objects[column] for column in columns)])
+    notices += _body_notices([*log.vehicles, *(log.objects[column] for column in columns)])
     if missing := len(log.objects) - len(columns):
         notices.append(f'{missing} objects never appeared in the run and are left out')
     return found
@@ -287,7 +287,7 @@ class Body:
     ahead: float
 
 
-def body_of(item: ObjectDescription, parameters: VehicleParameters | None) -> Body:
+def _body_of(item: ObjectDescription, parameters: VehicleParameters | None) -> Body:
     """
     Describe a vehicle or object.
 
@@ -316,7 +316,7 @@ def body_of(item: ObjectDescription, parameters: VehicleParameters | None) -> Bo
     return Body(entity, ahead)
 
 
-def body_notices(items: list[ObjectDescription]) -> list[str]:
+def _body_notices(items: list[ObjectDescription]) -> list[str]:
     """Return a line for each kind of shape and type that OpenSCENARIO does not have."""
     shapes, types = defaultdict(list), defaultdict(list)
     for item in items:

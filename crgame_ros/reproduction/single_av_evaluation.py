@@ -151,7 +151,7 @@ class Encounter:
         return worst.value if worst is not None and worst.other == self.human else None
 
 
-def human_states(log: RunTrajectories) -> FloatArray:
+def _human_states(log: RunTrajectories) -> FloatArray:
     """Return the published states (K, H, 8) of the humans."""
     return log.published_states[:, :len(log.game.humans)]
 
@@ -210,12 +210,12 @@ def _goes_on(found: Encounter) -> Finding:
 
 
 def _same(found: SameHuman) -> Finding:
-    first = human_states(found.runs[0].log)
+    first = _human_states(found.runs[0].log)
     for other in found.runs[1:]:
-        states = human_states(other.log)
+        states = _human_states(other.log)
         if states.shape != first.shape or states.tobytes() != first.tobytes():
             return Finding(False, f'differs between {found.runs[0].planner} and {other.planner}')
-    recorded = human_states(found.recorded)
+    recorded = _human_states(found.recorded)
     common = min(len(recorded), len(first))
     # Positions and headings are recorded as they were, speeds as components in x and y.
     apart = np.abs(recorded[:common] - first[:common]).max(axis=(0, 1))

@@ -116,7 +116,7 @@ class PolledSubscription:
 
     def _take(self) -> tuple[bytes, int, int] | None:
         if self._sent:
-            message = take_sent(self.subscription)
+            message = _take_sent(self.subscription)
             if message is None:
                 return None
             self.publisher = message.publisher
@@ -321,7 +321,7 @@ class SentMessage(NamedTuple):
     publisher: bytes
 
 
-def take_sent(subscription: Subscription) -> SentMessage | None:
+def _take_sent(subscription: Subscription) -> SentMessage | None:
     """
     Remove and return the oldest message of a subscription, None if there is none.
 

@@ -54,7 +54,7 @@ Parts = Sequence[tuple[Shape, Sequence[float]]]
 def scenario_header(benchmark_id: str, time_step_s: float, source: str, *, author: str = '',
                     affiliation: str = '', day: str = NO_DAY) -> dict[str, str]:
     """Return the attributes of the root element of a CommonRoad 2020a file."""
-    return {'timeStepSize': exact_number(time_step_s), 'commonRoadVersion': '2020a',
+    return {'timeStepSize': _exact_number(time_step_s), 'commonRoadVersion': '2020a',
             'author': author, 'affiliation': affiliation, 'source': source,
             'benchmarkID': benchmark_id, 'date': day}
 
@@ -110,7 +110,7 @@ def whole(shape: Shape) -> Parts:
     return ((shape, (0.0, 0.0, 0.0)),)
 
 
-def exact_number(value: float) -> str:
+def _exact_number(value: float) -> str:
     """Return a number as text, to 1e-12 (a picometre), without exponent."""
     text = f'{value:.12f}'.rstrip('0')
     return text + '0' if text.endswith('.') else text
@@ -210,7 +210,7 @@ def goal_state(time: tuple[int, int], position: str,
     if position:
         text += f'<position>{position}</position>'
     for name, start, end in intervals:
-        text += f'<{name}>{_interval(exact_number(start), exact_number(end))}</{name}>'
+        text += f'<{name}>{_interval(_exact_number(start), _exact_number(end))}</{name}>'
     return f'<goalState>{text}</goalState>\n'
 
 
@@ -276,11 +276,11 @@ def _placed(parts: Parts, pose: Sequence[float]) -> str:
 def _shape(shape: Shape) -> str:
     """Return the XML of a footprint in the coordinates of its object."""
     if shape.kind == 'circle':
-        return f'<circle><radius>{exact_number(0.5 * shape.length)}</radius></circle>'
+        return f'<circle><radius>{_exact_number(0.5 * shape.length)}</radius></circle>'
     if shape.kind == 'polygon':
         return _polygon(shape.vertices)
-    return (f'<rectangle><length>{exact_number(shape.length)}</length>'
-            f'<width>{exact_number(shape.width)}</width></rectangle>')
+    return (f'<rectangle><length>{_exact_number(shape.length)}</length>'
+            f'<width>{_exact_number(shape.width)}</width></rectangle>')
 
 
 def _placed_shape(shape: Shape, pose: Sequence[float]) -> str:
@@ -288,11 +288,11 @@ def _placed_shape(shape: Shape, pose: Sequence[float]) -> str:
     x, y, yaw = pose
     center = f'<center><x>{x:.4f}</x><y>{y:.4f}</y></center>'
     if shape.kind == 'circle':
-        return f'<circle><radius>{exact_number(0.5 * shape.length)}</radius>{center}</circle>'
+        return f'<circle><radius>{_exact_number(0.5 * shape.length)}</radius>{center}</circle>'
     if shape.kind == 'polygon':
         return _polygon(placed_at(outline(shape), x, y, yaw).tolist())
-    return (f'<rectangle><length>{exact_number(shape.length)}</length>'
-            f'<width>{exact_number(shape.width)}</width>'
+    return (f'<rectangle><length>{_exact_number(shape.length)}</length>'
+            f'<width>{_exact_number(shape.width)}</width>'
             f'<orientation>{yaw:.4f}</orientation>{center}</rectangle>')
 
 

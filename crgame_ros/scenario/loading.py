@@ -66,7 +66,7 @@ class LaneletHeights:
     right: NDArray[np.float64]
 
 
-def take_heights(root: etree._Element) -> tuple[dict[int, LaneletHeights], list[str]]:
+def _take_heights(root: etree._Element) -> tuple[dict[int, LaneletHeights], list[str]]:
     """
     Read the heights of lanelets whose vertices all have one, and remove all heights.
 
@@ -125,7 +125,7 @@ class LoadedScenario:
         """Return the planning problems of recorded humans, with the obstacles of their drives."""
         recorded = {obstacle.obstacle_id for obstacle in self.scenario.dynamic_obstacles}
         return {problem: obstacle for problem, obstacle
-                in read_human_note(self.scenario.source or '').items() if obstacle in recorded}
+                in _read_human_note(self.scenario.source or '').items() if obstacle in recorded}
 
 
 def load_scenario(path: Path) -> LoadedScenario:
@@ -161,7 +161,7 @@ def _parsed(xml_text: str, source: str) -> LoadedScenario:
     root = guard.parse_hardened(xml_text, source)
     notices = upgrade(root) + mend_places(root)
     guard.refuse_malformed(root, source)
-    heights, remarks = take_heights(root)
+    heights, remarks = _take_heights(root)
     notices += remarks + mend(root) + unused_elements(root)
     scenario, problems, remarks = _read(etree.tostring(root), source)
     notices += remarks
@@ -287,7 +287,7 @@ def without_human_notes(source: str) -> str:
     return _NOTE.sub('', source)
 
 
-def read_human_note(source: str) -> dict[int, int]:
+def _read_human_note(source: str) -> dict[int, int]:
     """
     Return the humans in a note of `human_note`.
 
@@ -307,6 +307,6 @@ def plays_its_humans(path: Path) -> bool:
     :raises InputError: if it cannot be read.
     """
     root = guard.parse_hardened(guard.read_text(path), str(path))
-    humans = read_human_note(root.get('source', ''))
+    humans = _read_human_note(root.get('source', ''))
     problems = {problem.get('id') for problem in root.iterchildren('planningProblem')}
     return bool(humans) and not problems <= {str(number) for number in humans}

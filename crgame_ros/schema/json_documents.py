@@ -54,7 +54,7 @@ class JsonDocument(Generic[T]):
             return self._adapter.validate_python(
                 json.loads(text, parse_constant=_refuse), context=self.topic)
         except ValidationError as error:
-            fault = first_fault(error)
+            fault = _first_fault(error)
             place = '.'.join(map(str, fault.place)) or 'all of it'
             raise InputError(f'is no {self._what} ({place}: {fault.said})', self.topic,
                              self._remedy) from None
@@ -110,7 +110,7 @@ class MessageReader(Generic[M]):
 
 
 def _refusal(error: ValidationError) -> InputError:
-    fault = first_fault(error)
+    fault = _first_fault(error)
     if fault.kind.startswith('union_tag'):
         return InputError('is unknown', 'type')
     # The first part is the message's type; a message without a type has no place.
@@ -153,7 +153,7 @@ class Fault(NamedTuple):
     said: str
 
 
-def first_fault(error: 'ValidationError') -> Fault:
+def _first_fault(error: 'ValidationError') -> Fault:
     """Return the first fault; the value may be long, and others may read the log."""
     first = error.errors(include_url=False, include_context=False, include_input=False)[0]
     said = 'has another form' if first['type'] == 'predicate_failed' \

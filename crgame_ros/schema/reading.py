@@ -150,11 +150,11 @@ class _Reader:
         values = moved(form, given)
         wrong = _Wrong()
         with wrong:
-            known, beside = known_beside(kind, values, where)
+            known, beside = _known_beside(kind, values, where)
             for name in values:
                 if name not in known and form.rest is None:
                     with wrong:
-                        refuse_unknown(name, known, where, beside)
+                        _refuse_unknown(name, known, where, beside)
         # A key that is unknown in this combination needs no further error.
         checked: dict[str, object] = {}
         for key in () if wrong.found and form.by else keys_of(kind):
@@ -350,8 +350,8 @@ def moved(form: Form, given: Mapping[object, Any]) -> dict[object, object]:
     return values
 
 
-def known_beside(kind: type[object], values: Mapping[object, object],
-                 where: str) -> tuple[tuple[str, ...], str]:
+def _known_beside(kind: type[object], values: Mapping[object, object],
+                  where: str) -> tuple[tuple[str, ...], str]:
     """
     Return the keys that are known together with those given.
 
@@ -387,7 +387,7 @@ def keys_beside(kind: type[object], place: str) -> tuple[str, ...]:
                  if (beside := key.mark(OnlyWith)) is None or place in beside.keys)
 
 
-def refuse_unknown(name: object, known: Sequence[str], where: str, beside: str = '') -> NoReturn:
+def _refuse_unknown(name: object, known: Sequence[str], where: str, beside: str = '') -> NoReturn:
     """
     Refuse a key.
 

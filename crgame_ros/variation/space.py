@@ -33,6 +33,7 @@ from simpleeval import InvalidExpression, SimpleEval
 
 Variant = Mapping[str, object]
 Point = NDArray[np.float64]
+Points = NDArray[np.float64]
 # Values have so many digits: a variant is read and written by people.
 DIGITS = 6
 # Share of the probability of a distribution that is cut off at an open end.
@@ -192,7 +193,7 @@ class VariantSpace:
     def _nominal(self, axis: Axis) -> object:
         if axis.spec.nominal is not None:
             return axis.spec.nominal
-        given = None if axis.spec.key is None else value_at(self.values, axis.spec.key)
+        given = None if axis.spec.key is None else _value_at(self.values, axis.spec.key)
         return axis.value(0.5) if given is None else given
 
     def variant(self, point: Sequence[float] | Point) -> dict[str, object]:
@@ -268,7 +269,7 @@ def game_of(game: Game, variant: Variant, where: str) -> Game:
     return parse_game(space.game_values(variant), where, game.base)
 
 
-def value_at(values: Any, path: str) -> object:
+def _value_at(values: Any, path: str) -> object:
     """
     Return the value of a key; None where it is not given.
 
@@ -394,7 +395,7 @@ def sample(space: VariantSpace, sampling: Sampling, number: int, seed: int,
     return found[:number]
 
 
-def _points(sampling: Sampling, dimensions: int, seed: int) -> Callable[[int], NDArray[np.float64]]:
+def _points(sampling: Sampling, dimensions: int, seed: int) -> Callable[[int], Points]:
     """Return a source of points: called with their number, it returns (N, dimensions)."""
     # It takes a second to load, and not everyone who reads games draws points.
     from scipy.stats import qmc
@@ -403,7 +404,7 @@ def _points(sampling: Sampling, dimensions: int, seed: int) -> Callable[[int], N
         return lambda number: rng.random((number, dimensions))
     engine = {'sobol': qmc.Sobol, 'lhs': qmc.LatinHypercube}[sampling](dimensions, rng=seed)
 
-    def draw(number: int) -> NDArray[np.float64]:
-        points: NDArray[np.float64] = engine.random(number)
+    def draw(number: int) -> Points:
+        points: Points = engine.random(number)
         return points
     return draw

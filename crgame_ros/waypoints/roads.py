@@ -125,7 +125,7 @@ class WaypointRoads:
 
         :raises InputError: naming the file and the line.
         """
-        rows = read_lane_rows(path)
+        rows = _read_lane_rows(path)
         lanes, links = {}, {}
         for lane, entry in rows.items():
             try:
@@ -144,7 +144,7 @@ class WaypointRoads:
 
     def to_csv(self, path: Path) -> None:
         """Write the way-points so that `from_csv` gives the same roads to the last bit."""
-        write_lane_rows(path, {
+        _write_lane_rows(path, {
             lane: LaneRows(0, road.rows, vars(self._links[lane]))
             for lane, road in self._lanes.items()})
 
@@ -256,7 +256,7 @@ class LaneRows:
     links: dict[str, Any] = field(default_factory=dict)
 
 
-def read_lane_rows(path: Path) -> dict[int, LaneRows]:
+def _read_lane_rows(path: Path) -> dict[int, LaneRows]:
     """
     Read a table of way-points, lane by lane.
 
@@ -356,9 +356,9 @@ def _links(cells: Mapping[str, str], where: str) -> dict[str, object]:
     return links
 
 
-def write_lane_rows(path: Path, lanes: Mapping[int, LaneRows]) -> None:
+def _write_lane_rows(path: Path, lanes: Mapping[int, LaneRows]) -> None:
     """
-    Write a table of way-points that `read_lane_rows` can read; numbers keep every bit.
+    Write a table of way-points that `_read_lane_rows` can read; numbers keep every bit.
 
     :raises InputError: if the file cannot be written.
     """

@@ -149,7 +149,7 @@ def _finished(text: str, source: Path, kind: WorldKind, cycles: list[LightCycle 
         f'{source.name}, {kind.label}, by {DESIGNER.title} and crgame import'))
     remarks += [notice.removeprefix(f'{made}: ') for notice in loaded.notices
                 if 'no planning problem' not in notice]
-    remarks += road_remarks(network)
+    remarks += _road_remarks(network)
     drivable = [lanelet for lanelet in network.lanelet_ids if network.is_drivable(lanelet)]
     return ImportedMap(scenario_document(header, roads.elements, problem),
                        len(network.lanelet_ids),
@@ -192,7 +192,7 @@ def _problem(network: RoadNetwork, number: int, written: dict[int, int]) -> str:
                             [goal_state((0, _GOAL_STEPS), goal)])
 
 
-def road_remarks(network: RoadNetwork) -> list[str]:
+def _road_remarks(network: RoadNetwork) -> list[str]:
     """
     Return remarks on the lanes for cars, one line each.
 

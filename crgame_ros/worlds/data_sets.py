@@ -135,7 +135,7 @@ def _finish(path: Path, recording: Recording, window: int,
     what = f'{order.kind.label}, recording {recording.name}'
     loaded = parse_scenario(text, what)
     last = loaded.scenario.scenario_id.prediction_id
-    made = recorded_scenario(
+    made = _recorded_scenario(
         loaded, _PER_RECORDING * recording.number + window,
         f'{what}, up to frame {last}, by {DATA_SET_CONVERTER.title} and crgame import')
     if made is None:
@@ -224,8 +224,8 @@ class RecordedScenario:
     xml_text: str
 
 
-def recorded_scenario(loaded: LoadedScenario, number: int,
-                      source: str) -> RecordedScenario | None:
+def _recorded_scenario(loaded: LoadedScenario, number: int,
+                       source: str) -> RecordedScenario | None:
     """
     Return a scenario in which an AV takes the place of a recorded car.
 

@@ -203,10 +203,10 @@ class _Conflict:
         last = len(self._states) - 1
         after = np.minimum(np.append(ticks, ticks[-1] + self._tick), last)
         theirs = predicted(
-            poses_at(self._motions, ticks)[:, other], velocities_of(self._motions, other, after),
+            poses_at(self._motions, ticks)[:, other], _velocities_of(self._motions, other, after),
             self._tick * self._dt_s, ahead_s)
         steps = ticks[:, None] + np.rint(ahead_s / self._dt_s).astype(np.int64)
-        as_driven = driven_poses_at(self._motions, steps.ravel())[:, self._column].reshape(
+        as_driven = _driven_poses_at(self._motions, steps.ravel())[:, self._column].reshape(
             *steps.shape, 3)
         path = Path(self._states[ticks[0]:, :3])
         direction = -1.0 if self._states[self._hit.n - 1, StateColumn.SPEED] < 0.0 else 1.0
@@ -303,10 +303,10 @@ def poses_at(motions: Motions, steps: IntArray) -> FloatArray:
     turning_s = since_s - _beyond_s(motions, steps)
     elapsed_s = np.stack((since_s, since_s, turning_s), axis=-1)
     others = motions.object_poses[rows] + motions.object_velocities[rows] * elapsed_s[:, None]
-    return np.concatenate((driven_poses_at(motions, steps), others), axis=1)
+    return np.concatenate((_driven_poses_at(motions, steps), others), axis=1)
 
 
-def driven_poses_at(motions: Motions, steps: IntArray) -> FloatArray:
+def _driven_poses_at(motions: Motions, steps: IntArray) -> FloatArray:
     """Return the poses of the driven vehicles' centres as `poses_at` (T, V, 3)."""
     states = motions.vehicle_states[np.minimum(steps, len(motions.vehicle_states) - 1)]
     offsets = np.array([item.rear_to_center for item in motions.descriptions[:states.shape[1]]])
@@ -324,7 +324,7 @@ def _rows(motions: Motions, steps: IntArray) -> IntArray:
     return np.maximum(np.searchsorted(motions.object_ns, steps, side='right') - 1, 0)
 
 
-def velocities_of(motions: Motions, column: int, steps: IntArray) -> FloatArray:
+def _velocities_of(motions: Motions, column: int, steps: IntArray) -> FloatArray:
     """
     Return the derivatives of a centre's poses at simulation steps of the run (T, 3).
 

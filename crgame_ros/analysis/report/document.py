@@ -131,7 +131,7 @@ class Page:
         done = ''.join(f'<template id="{found}"></template>'
                        for found in dict.fromkeys(_STYLE_OF_MAPS.findall(plotly)))
         return _document(self.title, (style, _EMPTY), done, '\n'.join((
-            body, f'<script id="plots" type="application/json">{plot_data(plots)}</script>',
+            body, f'<script id="plots" type="application/json">{_plot_data(plots)}</script>',
             f'<script>{plotly}</script>', f'<script>{script}</script>')), (plotly, script))
 
 
@@ -250,7 +250,7 @@ def script_json(content: object) -> str:
     return text.replace('<', '\\u003c').replace('>', '\\u003e').replace('&', '\\u0026')
 
 
-def plot_data(plots: Sequence[tuple[str, Plot]]) -> str:
+def _plot_data(plots: Sequence[tuple[str, Plot]]) -> str:
     """
     Return the data of plots as JSON that is safe in a `<script>`.
 

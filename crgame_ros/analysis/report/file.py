@@ -70,7 +70,7 @@ def report_html(runs: Sequence[Run], software: str = '') -> str:
                     software).html()
     runs = [run.as_part(f'run{number}') for number, run in enumerate(runs, 1)]
     return Page(title, f'{len(runs)} runs', (), [
-        Article([comparison_section(runs)], 'all'),
+        Article([_comparison_section(runs)], 'all'),
         *(Article(_sections(run), run.key, free(run.name), letter(place), _lead(run),
                   list(_facts(run))) for place, run in enumerate(runs))], software).html()
 
@@ -97,7 +97,7 @@ def _facts(run: Run) -> Iterator[tuple[str, str]]:
     if run.outcome is not None:
         yield 'violations', str(run.outcome['drivability']['violations'])
     for name in ('ttc', 'min_distance', 'drac'):
-        yield MEASURES[name].head, worst_of_all(run, name)
+        yield MEASURES[name].head, _worst_of_all(run, name)
     if run.log.game.avs and run.outcome is not None:
         yield 'plans accepted', accepted(run).partition(' (')[0]
     if run.timing is not None:
@@ -138,7 +138,7 @@ def check_report_runs(count: int) -> None:
         raise InputError(f'{count} runs', 'report', f'give {MOST_RUNS} at most')
 
 
-def comparison_section(runs: Sequence[Run]) -> Section:
+def _comparison_section(runs: Sequence[Run]) -> Section:
     """Return the section that compares runs; letters identify them in plots."""
     head = ('', *(f'{letter(i)}: {free(run.name)}' for i, run in enumerate(runs)))
     rows = [(words, *(cell(run) for run in runs)) for words, cell in _rows()]
@@ -164,7 +164,7 @@ def _rows() -> Iterator[tuple[str, Callable[[Run], str]]]:
     yield 'seed', lambda run: str(run.log.game.seed)
     yield 'length [s]', lambda run: number(float(run.times_s[-1]), 1)
     for name, measure in CHIEF.items():
-        yield measure.head, lambda run, name=name: worst_of_all(run, name)  # type: ignore[misc]
+        yield measure.head, lambda run, name=name: _worst_of_all(run, name)  # type: ignore[misc]
     yield 'time below the threshold of TTC [s]', lambda run: number(sum(
         each.exposures['tet_s'] for each in run.usual_criticality.report()))
     yield 'least PET [s]', _least_pet
@@ -179,7 +179,7 @@ def _rows() -> Iterator[tuple[str, Callable[[Run], str]]]:
         run, lambda timing: number(timing['max_cumulative_error_ms'], 1))
 
 
-def worst_of_all(run: Run, name: str) -> str:
+def _worst_of_all(run: Run, name: str) -> str:
     """Return the worst value of a measure over all vehicles of a run, linked to its moment."""
     found = [each.worst[name] for each in run.usual_criticality.report() if name in each.worst]
     if not found:

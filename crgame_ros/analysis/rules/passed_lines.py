@@ -64,7 +64,7 @@ class StopLine(NamedTuple):
     begins: bool
 
 
-def find_stop_lines(network: LaneletNetwork) -> tuple[StopLine, ...]:
+def _find_stop_lines(network: LaneletNetwork) -> tuple[StopLine, ...]:
     """List the lines of a map that have lights or a stop sign."""
     inner = _first_of_junctions(network)
     found = []
@@ -122,8 +122,8 @@ class LineCrossing(NamedTuple):
     aside: float
 
 
-def line_crossings(lines: Sequence[StopLine], poses: FloatArray, front: float,
-                   jumps: Sequence[int]) -> list[list[LineCrossing]]:
+def _line_crossings(lines: Sequence[StopLine], poses: FloatArray, front: float,
+                    jumps: Sequence[int]) -> list[list[LineCrossing]]:
     """
     Find the lines that a vehicle drove over in the direction of their lanes, in order.
 
@@ -214,7 +214,7 @@ class LineRules:
     """
 
     def __init__(self, scenario: Scenario, roads: RoadNetwork) -> None:
-        self.lines = find_stop_lines(scenario.lanelet_network)
+        self.lines = _find_stop_lines(scenario.lanelet_network)
         self._lights = TrafficLights(scenario)
         self._roads = roads
         # By the line's lanelet: the movements of lanelets behind it.
@@ -222,7 +222,7 @@ class LineRules:
 
     def passed(self, track: DrivenTrack) -> tuple[PassedLine, ...]:
         """Return the lines that a vehicle passed against a light or a sign, in order."""
-        halts = line_crossings(self.lines, track.states[:, :3], track.front, track.jumps)
+        halts = _line_crossings(self.lines, track.states[:, :3], track.front, track.jumps)
         return tuple(found for halt in halts for found in self._judged(track, halt))
 
     def _judged(self, track: DrivenTrack, halt: Sequence[LineCrossing]) -> Iterator[PassedLine]:

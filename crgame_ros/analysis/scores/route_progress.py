@@ -168,13 +168,13 @@ def find_lanes(roads: RoadNetwork, drive: ScoredDrive) -> LanesDriven:
                for number in range(drive.outlines.shape[1])]
     one = np.array([_share_a_lane(network, sets, drive.shape.length)
                     for sets in zip(*corners, strict=True)], dtype=bool)
-    crossing = intersection_lanelets(network)
+    crossing = _intersection_lanelets(network)
     axles = _inside(tree, drive.rear_axles[:, :2], roads)
     return LanesDriven(ids[numbers], one,
                        np.array([bool(found & crossing) for found in axles], dtype=bool))
 
 
-def intersection_lanelets(network: LaneletNetwork) -> frozenset[int]:
+def _intersection_lanelets(network: LaneletNetwork) -> frozenset[int]:
     """Return the lanelets in intersections, by type or as successors of an incoming."""
     found = {lanelet.lanelet_id for lanelet in network.lanelets
              if LaneletType.INTERSECTION in lanelet.lanelet_type}

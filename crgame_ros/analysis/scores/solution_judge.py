@@ -47,10 +47,10 @@ class SolutionChecks:
         return {'valid': self.is_valid, 'failed': self.failed, 'passed': list(self.passed)}
 
 
-def check_solution(scenario: Scenario, problem: PlanningProblem,
-                   found: PlanningProblemSolution, poses: NDArray[np.float64],
-                   feasibility: TrajectoryFeasibility, boundary: RoadBoundary,
-                   earlier: Mapping[str, str]) -> SolutionChecks:
+def _check_solution(scenario: Scenario, problem: PlanningProblem,
+                    found: PlanningProblemSolution, poses: NDArray[np.float64],
+                    feasibility: TrajectoryFeasibility, boundary: RoadBoundary,
+                    earlier: Mapping[str, str]) -> SolutionChecks:
     """
     Check the solution of one problem, as `valid_solution` does.
 
@@ -159,8 +159,8 @@ class SolutionJudge:
         problem = self._scored.problem(found.planning_problem_id)
         scenario = self._scored.without_own({found.planning_problem_id, *others})
         feasibility = check_feasibility(found, problem, float(scenario.dt), progress)
-        checks = check_solution(scenario, problem, found, poses_of(driven.state_list),
-                                feasibility, self._boundary, failed or {})
+        checks = _check_solution(scenario, problem, found, poses_of(driven.state_list),
+                                 feasibility, self._boundary, failed or {})
         return SolutionScores(
             found, exact_type,
             evaluate_costs(scenario, problem, driven, found.vehicle_type, costs), checks,

@@ -164,7 +164,7 @@ class LightMarker(Item):
 
 def _box(header: Header, namespace: str, number: int, item: ObjectDescription,
          height: float) -> Marker:
-    shape, paint = item.shape, colour(body_colour(item))
+    shape, paint = item.shape, colour(_body_colour(item))
     if shape.kind == 'polygon':
         marker = blank(header, namespace, number, Marker.TRIANGLE_LIST, paint,
                        lifetime_s=LIFETIME_S)
@@ -207,7 +207,7 @@ def colour(code: str, alpha: float = 1.0) -> ColorRGBA:
     return ColorRGBA(r=red, g=green, b=blue, a=alpha)
 
 
-def body_colour(item: ObjectDescription) -> str:
+def _body_colour(item: ObjectDescription) -> str:
     """Return the colour of an object; people outside cars stand out."""
     return PURPLE if item.type in SOFT_TYPES else ROLE_COLOURS[item.role]
 

@@ -130,7 +130,7 @@ def planned_people(study: StudyFile, count: int) -> list[SimulatedPerson]:
                             groups[number % len(groups)]) for number in range(count)]
 
 
-def compared_trials(study: StudyFile, place: int, group: str) -> tuple[PlannedTrial, ...]:
+def _compared_trials(study: StudyFile, place: int, group: str) -> tuple[PlannedTrial, ...]:
     """Return the planned trials of a participant that comparisons use: none of staircases."""
     return tuple(trial for trial in plan_trials(study, place, group) if trial.staircase is None)
 
@@ -164,7 +164,7 @@ def measure_models(study: StudyFile, effects: bool = True) -> dict[str, MeasureM
     :param effects: whether levels have the effects that the plan states, or none.
     :raises InputError: if the comparisons of a measure state different standard deviations.
     """
-    trials = compared_trials(study, 0, study.group_names[0])
+    trials = _compared_trials(study, 0, study.group_names[0])
     models: dict[str, MeasureModel] = {}
     measures = dict.fromkeys(each.measure for each in study.analysis.comparisons)
     for measure in measures:
@@ -265,7 +265,7 @@ class SimulatedTrials:
         self._models = models
         self.measures = tuple(models)
         planned = [(number, _grouped(study, person, trial)) for number, person in enumerate(people)
-                   for trial in compared_trials(study, person.place, person.group)]
+                   for trial in _compared_trials(study, person.place, person.group)]
         self.rows: list[dict[str, Any]] = [
             {'participant': people[number].id, 'trial': trial.number, 'block': trial.block,
              **levels} for number, (trial, levels) in planned]

@@ -86,8 +86,8 @@ class _Stream(NamedTuple):
     texts: list[list[str | None]]
 
 
-def write_recordings(trial: CountedTrial, folder: Path, participant: str, task: str,
-                     begun_s: float) -> None:
+def _write_recordings(trial: CountedTrial, folder: Path, participant: str, task: str,
+                      begun_s: float) -> None:
     """
     Write the streams of a trial that have a steady rate, each with a sidecar.
 
@@ -120,7 +120,7 @@ def write_recordings(trial: CountedTrial, folder: Path, participant: str, task: 
             indent=2, ensure_ascii=False) + '\n', folder / f'{name}.json')
 
 
-def instrument_events(trial: CountedTrial) -> Iterator[InstrumentEvent]:
+def _instrument_events(trial: CountedTrial) -> Iterator[InstrumentEvent]:
     """Yield the samples of a trial's streams that have no steady rate."""
     start_s = drive_start_s(trial.attempt)
     for stream in _streams(trial):
@@ -224,7 +224,7 @@ def write_bids(data: StudyData, out: Path) -> None:
         trials = [trial for trial in data.trials if trial.record is record]
         rows = [*_events(record, mine), *(
             _instrument_row(record, trial, event)
-            for trial in trials for event in instrument_events(trial))]
+            for trial in trials for event in _instrument_events(trial))]
         # Equal times stay in the order of the journal.
         rows.sort(key=lambda row: row[0])
         _tsv(folder / f'{name}.tsv', list(_EVENT_COLUMNS), rows)
@@ -232,7 +232,7 @@ def write_bids(data: StudyData, out: Path) -> None:
             'TaskName': task, 'TaskDescription': title, 'StimulusPresentation': {
                 'SoftwareName': 'crgame_ros', 'SoftwareVersion': __version__}, **_sidecar()})
         for trial in trials:
-            write_recordings(trial, folder, f'sub-{labels[record.id]}', task, record.begun_at)
+            _write_recordings(trial, folder, f'sub-{labels[record.id]}', task, record.begun_at)
 
 
 def escaped(value: object) -> str:

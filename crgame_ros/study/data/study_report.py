@@ -79,11 +79,11 @@ def study_html(data: StudyData) -> str:
         title = f'Made data: {title}'
     sections = [
         Section('conditions', 'Conditions', condition_section(data)),
-        *([Section('planned', 'Planned comparisons', planned_section(data))]
+        *([Section('planned', 'Planned comparisons', _planned_section(data))]
           if study.analysis.comparisons else ()),
-        *([Section('staircases', 'Staircases', staircase_section(data))]
+        *([Section('staircases', 'Staircases', _staircase_section(data))]
           if study.has_staircases else ()),
-        Section('people', 'Who took part', flow_table(data) + _people(data)),
+        Section('people', 'Who took part', _flow_table(data) + _people(data)),
         Section('troubles', 'Left out, aborted, repeated', _troubles(data)),
         Section('timing', 'Timing of each trial', _timing(data)),
         Section('paper', 'What to report in a paper', paper_section(data))]
@@ -171,11 +171,11 @@ def _timed(trials: Sequence[CountedTrial]) -> Iterator[Sequence[str]]:
         reason = '; '.join(filter(None, (row['timing_reason'], row['page_reason'])))
         beyond = marked(free(reason), True) if reason else free(row['problem'] or '')
         yield (free(row['participant']), str(row['trial']), free(row['condition']),
-               *(_timing(row.get(name), factor, digits) for name, _, factor, digits in _TIMES),
+               *(_measured(row.get(name), factor, digits) for name, _, factor, digits in _TIMES),
                beyond)
 
 
-def _timing(value: float | None, factor: float, digits: int) -> str:
+def _measured(value: float | None, factor: float, digits: int) -> str:
     return NOTHING if value is None else number(factor * value, digits)
 
 
@@ -214,7 +214,7 @@ def participant_flow(data: StudyData) -> list[tuple[str, dict[str, int]]]:
     return [(words, dict(counts)) for words, counts in flow.items()]
 
 
-def flow_table(data: StudyData) -> str:
+def _flow_table(data: StudyData) -> str:
     """Return the table of the flow; a column for each group if the study has groups."""
     flow = participant_flow(data)
     groups = data.folder.study.groups
@@ -228,7 +228,7 @@ def flow_table(data: StudyData) -> str:
             if groups is not None else '')
 
 
-def staircase_section(data: StudyData) -> str:
+def _staircase_section(data: StudyData) -> str:
     """Return the section."""
     rules = {block.name: block.staircase.told for block in data.folder.study.blocks
              if block.staircase is not None}
@@ -254,10 +254,10 @@ def staircase_section(data: StudyData) -> str:
 
 def _figure(words: str, track: Track) -> str:
     return f'<figure class="chart"><figcaption>{plain(words)}</figcaption>' \
-        f'{track_svg(track, words)}</figure>'
+        f'{_track_svg(track, words)}</figure>'
 
 
-def track_svg(track: Track, words: str) -> str:
+def _track_svg(track: Track, words: str) -> str:
     """
     Draw the levels of a track's trials, as SVG.
 
@@ -308,7 +308,7 @@ def _points(track: Track, trials: Sequence[tuple[int, StaircaseTrial]],
     return marks
 
 
-def planned_section(data: StudyData) -> str:
+def _planned_section(data: StudyData) -> str:
     """Return the section; a comparison of no column with numbers is named instead."""
     study = data.folder.study
     try:
