@@ -7,9 +7,8 @@ from pathlib import Path
 from crgame_ros.analysis.criticality.criticality import measure_log
 from crgame_ros.analysis.pictures.critical_moments import critical_moments
 from crgame_ros.analysis.pictures.figure_style import figure_bytes
-from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps
+from crgame_ros.analysis.pictures.frames_figure import draw_run, frames_figure, panel_steps
 from crgame_ros.analysis.pictures.profiles_figure import profiles_figure
-from crgame_ros.analysis.pictures.run_figure import draw_run
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game

@@ -22,9 +22,9 @@ from crgame_ros.messages.joints import (
     from_joint_trajectory,
     vehicle_joint_names,
     vehicles_from_joints,
+    WorldMessages,
 )
 from crgame_ros.messages.request_layout import RequestLayout
-from crgame_ros.messages.world_messages import WorldMessages
 from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
 import numpy as np
 from numpy.typing import NDArray

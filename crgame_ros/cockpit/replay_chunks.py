@@ -10,7 +10,7 @@ from crgame_ros.cockpit.message_frames import Frame, MessageFrames, Place
 from crgame_ros.cockpit.replay_index import OCCUPANCY_TOPIC, pack, perception_topics, RunIndex
 from crgame_ros.errors import InputError
 from crgame_ros.messages.cdr import stamp_of
-from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
+from crgame_ros.messages.joints import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
 from crgame_ros.recording.reader import BagReader, DecodedMessage
 from crgame_ros.recording.run_cycles import CYCLE_TOPIC
 from crgame_ros.timing.cycle_rows import CycleTable

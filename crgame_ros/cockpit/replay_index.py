@@ -14,7 +14,7 @@ from crgame_ros.cockpit.replay_tracks import RunTracks, TrackCollector
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.messages.cdr import header_stamp_ns
-from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC, WorldMessages
+from crgame_ros.messages.joints import OBJECT_STATES_TOPIC, VEHICLES_TOPIC, WorldMessages
 from crgame_ros.recording.epochs import Epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import CYCLE_TOPIC

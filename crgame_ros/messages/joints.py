@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Trajectories as flat joint arrays: the core's image of trajectory_msgs/JointTrajectory.
+Trajectories as flat joint arrays, the core's image of JointTrajectory, and states in them.
 
 Both runners pass requests and plans through these functions, so that a planner gets the same bits
 in process and over DDS. A driven vehicle is the joints x, y, yaw and steering of its rear axle,
@@ -10,12 +10,13 @@ any other object x, y and yaw of its centre; absence is NaN (`msg_defs/interface
 Messages of a live run and of a recording have the same attributes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 import math
 from typing import Any
 
 from crgame_ros.errors import InputError
+from crgame_ros.game.objects import ObjectDescription, ObjectStates
 from crgame_ros.geometry.reference_point import joined
 from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.plan import Plan
@@ -29,6 +30,9 @@ MAP = 'map'
 NS_PER_S = 1_000_000_000
 
 FloatArray = NDArray[np.float64]
+VEHICLES_TOPIC = '/vehicles/state'
+TICK_STATES_TOPIC = '/vehicles/tick_state'
+OBJECT_STATES_TOPIC = '/traffic/objects'
 
 
 @dataclass(frozen=True)
@@ -252,3 +256,52 @@ class JointReader:
             # kept.
             self._orders = {key: [place[name] for name in self._wanted]}
         return self._orders[key]
+
+
+def joints_of(topic: str, ids: Iterable[str]) -> list[str]:
+    """Return the joint names of vehicles or objects, by the topic that holds them."""
+    names = object_joint_names if topic == OBJECT_STATES_TOPIC else vehicle_joint_names
+    return [name for item in ids for name in names(item)]
+
+
+class WorldMessages:
+    """
+    A reader of the states of one run's vehicles and objects.
+
+    :param descriptions: of the run.
+    :ivar vehicles: ids of the V driven vehicles, in order.
+    :ivar objects: ids of the M others, in order.
+    """
+
+    def __init__(self, descriptions: Iterable[ObjectDescription]) -> None:
+        known = tuple(descriptions)
+        self.vehicles = tuple(item.id for item in known if item.role.is_ego)
+        self.objects = tuple(item.id for item in known if not item.role.is_ego)
+        self._vehicles = JointReader(joints_of(VEHICLES_TOPIC, self.vehicles), VEHICLES_TOPIC)
+        self._objects = JointReader(joints_of(OBJECT_STATES_TOPIC, self.objects),
+                                    OBJECT_STATES_TOPIC)
+
+    def vehicle_joints(self, message: object) -> FloatArray:
+        """
+        Return (3, V, 4) positions, velocities and accelerations of the vehicles' joints.
+
+        :raises InputError: if the message is another run's.
+        """
+        return self._vehicles.read(message).reshape(3, -1, len(VEHICLE_JOINTS))
+
+    def vehicle_states(self, message: object) -> FloatArray:
+        """
+        Return (V, 8) states, columns as in `StateColumn`.
+
+        :raises InputError: if the message is another run's.
+        """
+        return vehicles_from_joints(*self.vehicle_joints(message))
+
+    def object_states(self, message: object) -> ObjectStates:
+        """
+        Return the objects' states.
+
+        :raises InputError: if the message is another run's.
+        """
+        point = self._objects.read(message).reshape(3, -1, len(OBJECT_JOINTS))
+        return ObjectStates(point[0], point[1])

@@ -37,8 +37,8 @@ from crgame_ros.messages.instrument_samples import (
     TextTimes,
     TRIGGERS,
 )
+from crgame_ros.messages.joints import VEHICLES_TOPIC, WorldMessages
 from crgame_ros.messages.status_values import read_status
-from crgame_ros.messages.world_messages import VEHICLES_TOPIC, WorldMessages
 from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
 from crgame_ros.ros.messages import from_time

@@ -10,8 +10,7 @@ import time
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import DrivenAv, SIGNALS, Signals
 from crgame_ros.messages.contract import load_contract
-from crgame_ros.messages.joints import from_joint_trajectory, MAP
-from crgame_ros.messages.world_messages import WorldMessages
+from crgame_ros.messages.joints import from_joint_trajectory, MAP, WorldMessages
 from crgame_ros.nodes.markers.markers import SceneMarkers
 from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription

@@ -16,11 +16,12 @@ from crgame_ros.messages.contract import load_contract
 from crgame_ros.messages.joints import (
     JointSeries,
     object_joint_names,
+    OBJECT_STATES_TOPIC,
     vehicle_joint_names,
     vehicle_to_joints,
+    VEHICLES_TOPIC,
 )
 from crgame_ros.messages.status_values import Status
-from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
 from crgame_ros.recording.exceptions import RecordingError
 from crgame_ros.recording.metadata import METADATA_FILE, TopicQos
 from crgame_ros.recording.run_cycles import CYCLE_TOPIC

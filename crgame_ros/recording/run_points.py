@@ -9,8 +9,13 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.messages.cdr import aligned, header_stamp_ns, LITTLE_ENDIAN
-from crgame_ros.messages.joints import VEHICLE_JOINTS, vehicles_from_joints
-from crgame_ros.messages.world_messages import JointReader, joints_of, VEHICLES_TOPIC
+from crgame_ros.messages.joints import (
+    JointReader,
+    joints_of,
+    VEHICLE_JOINTS,
+    vehicles_from_joints,
+    VEHICLES_TOPIC,
+)
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.resampling import farthest, piece_around, resample

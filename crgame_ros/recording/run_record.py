@@ -16,8 +16,8 @@ from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.seat_documents import DRIVERS, DrivingSpell, ORDER
 from crgame_ros.game.task_documents import TASK_LOG, TaskEntry
 from crgame_ros.messages.cdr import header_stamp_ns
+from crgame_ros.messages.joints import VEHICLES_TOPIC
 from crgame_ros.messages.status_values import read_status
-from crgame_ros.messages.world_messages import VEHICLES_TOPIC
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recorded_game import read_run_events

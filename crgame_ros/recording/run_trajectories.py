@@ -11,13 +11,11 @@ from crgame_ros.game.documents import GAME, GameDocument
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.messages.joints import (
+    OBJECT_STATES_TOPIC,
+    TICK_STATES_TOPIC,
     VEHICLE_JOINTS,
     vehicle_to_joints,
     vehicles_from_joints,
-)
-from crgame_ros.messages.world_messages import (
-    OBJECT_STATES_TOPIC,
-    TICK_STATES_TOPIC,
     VEHICLES_TOPIC,
 )
 from crgame_ros.recording.epochs import Epoch, read_epoch

@@ -13,9 +13,8 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.documents import EVENTS
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.messages.cdr import header_stamp_ns
-from crgame_ros.messages.joints import vehicles_from_joints
+from crgame_ros.messages.joints import OBJECT_STATES_TOPIC, vehicles_from_joints, VEHICLES_TOPIC
 from crgame_ros.messages.status_values import BRAKING, read_status
-from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
 from crgame_ros.planner.adapter import first_of_kind
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.reader import BagReader

@@ -10,8 +10,7 @@ from typing import Generic, TypeVar
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.objects import ObjectStates
-from crgame_ros.messages.joints import vehicles_from_joints
-from crgame_ros.messages.world_messages import WorldMessages
+from crgame_ros.messages.joints import vehicles_from_joints, WorldMessages
 from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import from_time

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crgame_ros.messages.cdr import stamp_of
-from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC, WorldMessages
+from crgame_ros.messages.joints import OBJECT_STATES_TOPIC, VEHICLES_TOPIC, WorldMessages
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.reader import BagReader
 import numpy as np

@@ -7,7 +7,7 @@ from typing import Any
 
 from crgame_ros.cockpit.message_frames import Frame, MAX_POINTS, MessageFrames
 from crgame_ros.errors import InputError
-from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
+from crgame_ros.messages.joints import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.ros.message_validator import message_type

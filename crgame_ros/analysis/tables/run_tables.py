@@ -17,8 +17,12 @@ from crgame_ros.analysis.tables.data_package import (
     PACKAGE_FILE,
     WrittenTable,
 )
-from crgame_ros.analysis.tables.gaze import GAZE_TABLES, write_gaze
-from crgame_ros.analysis.tables.instruments import INSTRUMENT_TABLES, write_instruments
+from crgame_ros.analysis.tables.instruments import (
+    GAZE_TABLES,
+    INSTRUMENT_TABLES,
+    write_gaze,
+    write_instruments,
+)
 from crgame_ros.analysis.tables.pairs import CROSSINGS, PAIRS, write_criticality
 from crgame_ros.analysis.tables.plans import plan_rows, PLANS
 from crgame_ros.analysis.tables.runs import RUN_PARTS, RUNS

@@ -7,8 +7,7 @@ from xml.etree import ElementTree
 
 from crgame_ros.analysis.pictures.frame_svg import frame_svg
 from crgame_ros.analysis.pictures.frame_window import FrameWindow, series_windows
-from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps
-from crgame_ros.analysis.pictures.run_figure import draw_run
+from crgame_ros.analysis.pictures.frames_figure import draw_run, frames_figure, panel_steps
 from crgame_ros.analysis.pictures.scene_frame import FollowedPlan, FrameScene
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription
