@@ -7,7 +7,7 @@ from pathlib import Path
 
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.geometry.shape import outline
+from crgame_ros.geometry.outline import outline
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario

@@ -4,7 +4,7 @@
 
 from pathlib import Path
 
-from crgame_ros.analysis.criticality.criticality import measure_log
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.pictures.critical_moments import critical_moments
 from crgame_ros.analysis.pictures.figure_style import figure_bytes
 from crgame_ros.analysis.pictures.frames_figure import draw_run, frames_figure, panel_steps

@@ -9,7 +9,8 @@ from pathlib import Path
 import time
 from typing import Any
 
-from crgame_ros.analysis.criticality.criticality import Criticality, measure_log
+from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.driver.source import IdleDriver
 from crgame_ros.errors import InputError
 from crgame_ros.recording.progress import Progress

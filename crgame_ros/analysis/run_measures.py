@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from crgame_ros.analysis.behaviour.driver import DriverBehaviour, measure_behaviour
 from crgame_ros.analysis.behaviour.task_events import detection_scores, DetectionScore, task_events
-from crgame_ros.analysis.criticality.criticality import Criticality, measure_log
+from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.analysis.rules.vehicle_rules import measure_rules, VehicleRules
 from crgame_ros.errors import InputError, short

@@ -15,7 +15,7 @@ from crgame_ros.game.task_documents import (
     SteadySeconds,
 )
 from crgame_ros.game.view_documents import ViewPicture
-from crgame_ros.schema.json_documents import Flag, HexKey, Message, MessageId, MessageReader
+from crgame_ros.schema.messages import Flag, HexKey, Message, MessageId, MessageReader
 from crgame_ros.timing.time_controller import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 from pydantic import (
     AfterValidator,

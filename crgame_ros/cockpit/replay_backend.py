@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any, Literal, TYPE_CHECKING
 
 from aiohttp import web
-from crgame_ros.analysis.criticality.criticality import Criticality, measure_log
+from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.criticality.rows import criticality_rows, CRITICALITY_TOPIC
 from crgame_ros.cockpit.message_frames import MessageFrames
 from crgame_ros.cockpit.page_messages import Command

@@ -17,8 +17,9 @@ from typing import NamedTuple
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectStates
+from crgame_ros.geometry.outline import Footprint, Primitive
 from crgame_ros.geometry.rigid_transform import Pose
-from crgame_ros.geometry.shape import Footprint, Primitive, Shape
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.occupancy.occupancy import OccupancyGrid, OccupancyMap
 import numpy as np
 from numpy.typing import NDArray

@@ -13,7 +13,8 @@ import math
 from typing import Literal, TypeAlias
 
 from crgame_ros.geometry.curve import arc_length
-from crgame_ros.geometry.shape import placed_polygon, Shape
+from crgame_ros.geometry.outline import placed_polygon
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.vehicle.state import REST
 import numpy as np
 from numpy.typing import NDArray

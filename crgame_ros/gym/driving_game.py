@@ -11,8 +11,8 @@ from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import DrivenHuman
 from crgame_ros.game.objects import ObjectStates
+from crgame_ros.geometry.outline import Footprint, Primitive
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.geometry.shape import Footprint, Primitive
 from crgame_ros.gym.av_pilot import AvPilot, stacked
 from crgame_ros.gym.episode_options import Start
 from crgame_ros.gym.episode_setups import EpisodeSetups

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws a game from above, fast enough for every step."""
 
+from crgame_ros.geometry.outline import outline, placed_at
 from crgame_ros.geometry.reference_point import ahead
-from crgame_ros.geometry.shape import outline, placed_at
 from crgame_ros.gym.driving_game import DrivingGame
 from crgame_ros.roads.boundary import lanelet_areas
 from crgame_ros.simulation.setup import Setup

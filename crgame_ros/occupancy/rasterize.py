@@ -19,7 +19,7 @@ import tempfile
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.objects import Role
-from crgame_ros.geometry.shape import placed_polygon
+from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.occupancy.map_file import INDEX_NAME, map_text, RasterSpec, read_map_file
 from crgame_ros.occupancy.sources import MAX_TILES, tile_name, write_pgm
 from crgame_ros.roads.boundary import (

@@ -12,7 +12,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import SensorSpec
 from crgame_ros.geometry.angles import wrap_pi
-from crgame_ros.geometry.shape import outline, placed
+from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.occupancy.occupancy import OccupancyGrid
 from crgame_ros.perception.noise import KeyedNoise
 from crgame_ros.registry import ModelRegistry

@@ -6,7 +6,8 @@ import math
 
 from commonroad_dc import pycrcc
 from crgame_ros.errors import PlanningError
-from crgame_ros.geometry.shape import outline, Shape
+from crgame_ros.geometry.outline import outline
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.messages.plan import PlanRequest
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.path_obstacles import prolong

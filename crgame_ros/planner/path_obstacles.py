@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 from crgame_ros.errors import PlanningError
 from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.polyline import ReferencePath
 from crgame_ros.geometry.reference_point import seen_from, zero_for_nan
-from crgame_ros.geometry.shape import outline, placed
 from crgame_ros.messages.plan import PlanRequest
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.vehicle.stopping import FIRM_BRAKING

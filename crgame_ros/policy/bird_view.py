@@ -7,8 +7,8 @@ import math
 
 from commonroad.scenario.lanelet import LaneletNetwork
 from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.polyline import ReferencePath
-from crgame_ros.geometry.shape import outline, placed
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from numpy.typing import NDArray

@@ -78,7 +78,7 @@ class Run(MeasuredRun):
 
         :raises InputError: if a threshold is not positive.
         """
-        from crgame_ros.analysis.criticality.criticality import measure_log
+        from crgame_ros.analysis.criticality.recorded import measure_log
         thresholds.check()
         found = self.usual_criticality if thresholds == USUAL else measure_log(
             self.log, thresholds)

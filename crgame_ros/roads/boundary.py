@@ -9,7 +9,8 @@ import math
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from commonroad_dc import pycrcc
-from crgame_ros.geometry.shape import Footprint, Shape, triangle_corners
+from crgame_ros.geometry.outline import Footprint, triangle_corners
+from crgame_ros.geometry.shape import Shape
 import numpy as np
 from numpy.typing import NDArray
 import shapely

@@ -15,7 +15,8 @@ from commonroad.common.util import Interval
 from commonroad.geometry.shape import Circle, Polygon, Rectangle
 from commonroad.geometry.shape import Shape as CommonRoadShape
 from crgame_ros.errors import CrgameError
-from crgame_ros.geometry.shape import outline, placed_at, Shape
+from crgame_ros.geometry.outline import outline, placed_at
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.exact_values import parts_of
 from crgame_ros.scenario.export_network import schema_errors
 from lxml import etree

@@ -12,8 +12,9 @@ from crgame_ros.game.game import HumanSpec, LaneletSpawn, PoseSpawn
 from crgame_ros.game.objects import ObjectDescription, ObjectStates
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.geometry.curve import Curve
+from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.geometry.reference_point import ahead
-from crgame_ros.geometry.shape import placed_polygon, Shape
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.exact_values import exact_position, exact_value
 from crgame_ros.vehicle.parameters import VehicleParameters

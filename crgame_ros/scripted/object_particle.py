@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from crgame_ros.game.object_spec import MoverType, ObjectSpec
 from crgame_ros.geometry.curve import Curve
-from crgame_ros.geometry.shape import half_extents
+from crgame_ros.geometry.outline import half_extents
 from crgame_ros.scripted.object_motion import ABSENT, Integrated, ObjectSurroundings
 from crgame_ros.vehicle.state import QUEUEING, REST
 from crgame_ros.vehicle.stopping import SpeedEnvelope

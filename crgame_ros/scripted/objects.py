@@ -11,8 +11,8 @@ from crgame_ros.game.object_spec import MoverType, ObjectSpec
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
 from crgame_ros.geometry.curve import arc_length, nearest
+from crgame_ros.geometry.outline import half_extents
 from crgame_ros.geometry.reference_point import seen_from
-from crgame_ros.geometry.shape import half_extents
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scripted.object_motion import (
     ABSENT,

@@ -12,7 +12,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.game import AvSpec, Game
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.geometry.shape import placed_polygon
+from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.scenario.spawn import problem_pose
 from crgame_ros.vehicle.parameters import load_vehicle_parameters

@@ -10,8 +10,9 @@ from crgame_ros.drivability.collision import CollisionDetector
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
-from crgame_ros.geometry.shape import placed_polygon, Shape
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.vehicle.driver_command import DriverCommand

@@ -8,7 +8,8 @@ import sys
 from typing import Any
 
 from browser_support import Browser
-from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality, measure_log
+from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.cockpit.frames import STATE_COLUMNS
 from crgame_ros.cockpit.replay_backend import ReplayBackend
 from crgame_ros.game.game import load_game

@@ -9,7 +9,8 @@ import sys
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
-from crgame_ros.analysis.criticality.criticality import measure_log, MEASURES, most_critical
+from crgame_ros.analysis.criticality.criticality import MEASURES, most_critical
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.criticality.rows import (
     COLUMNS,
     criticality_rows,

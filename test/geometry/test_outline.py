@@ -4,14 +4,8 @@
 
 import math
 
-from crgame_ros.geometry.shape import (
-    half_extents,
-    outline,
-    placed,
-    placed_at,
-    placed_polygon,
-    Shape,
-)
+from crgame_ros.geometry.outline import half_extents, outline, placed, placed_at, placed_polygon
+from crgame_ros.geometry.shape import Shape
 import numpy as np
 import pytest
 import shapely

@@ -4,7 +4,8 @@
 
 import math
 
-from crgame_ros.geometry.shape import outline, placed, Shape, touches
+from crgame_ros.geometry.outline import outline, placed, touches
+from crgame_ros.geometry.shape import Shape
 import numpy as np
 import pytest
 import shapely

@@ -12,7 +12,7 @@ import signal
 import commonroad
 from commonroad.common.file_reader import CommonRoadFileReader
 from commonroad.scenario.obstacle import DynamicObstacle
-from crgame_ros.analysis.criticality.criticality import measure_log
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.criticality.rows import (
     COLUMNS,
     criticality_rows,

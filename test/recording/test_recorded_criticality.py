@@ -6,7 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.analysis.criticality.criticality import Criticality, measure_log
+from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.cli import main
 from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory

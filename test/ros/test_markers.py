@@ -9,8 +9,9 @@ from pathlib import Path
 from crgame_ros.game.documents import GAME, OBJECTS, Signals
 from crgame_ros.game.game import load_game
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.geometry.outline import outline
 from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.geometry.shape import outline, Shape
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.messages.joints import JointSeries, object_joint_names, vehicle_joint_names
 from crgame_ros.nodes.markers import bodies
 from crgame_ros.nodes.markers.bodies import Body

@@ -10,7 +10,7 @@ from commonroad.scenario.obstacle import StaticObstacle
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import Role
 from crgame_ros.geometry.angles import wrap_pi_array
-from crgame_ros.geometry.shape import placed_polygon
+from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario, parse_scenario
 from crgame_ros.scenario.obstacle_motions import ObstacleMotions
 from crgame_ros.scenario.obstacles import convert_shape, ScenarioObstacles

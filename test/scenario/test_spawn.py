@@ -9,7 +9,8 @@ from commonroad_dc import pycrcc
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import HumanSpec, LaneletSpawn, PoseSpawn
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
-from crgame_ros.geometry.shape import placed_polygon, Shape
+from crgame_ros.geometry.outline import placed_polygon
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles

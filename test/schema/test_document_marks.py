@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.document_marks import Bounded
-from crgame_ros.schema.json_documents import JsonDocument, Message, MessageReader
+from crgame_ros.schema.json_documents import JsonDocument
+from crgame_ros.schema.messages import Message, MessageReader
 from pydantic import TypeAdapter, ValidationError
 import pytest
 

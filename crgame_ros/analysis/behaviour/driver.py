@@ -42,9 +42,9 @@ from crgame_ros.analysis.behaviour.reactions import (
 from crgame_ros.analysis.behaviour.task_events import DetectionScore
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.events import FiredEvent, SpeedLimit
+from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.geometry.shape import outline, placed
 from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import parse_scenario

@@ -24,8 +24,9 @@ from typing import get_args, Literal, NamedTuple
 from crgame_ros.analysis.blame.manoeuvres import Capability, drive, Manoeuvre, MANOEUVRES, Path
 from crgame_ros.drivability.collision import PERMANENT_OBSTACLE, PermanentObstacles
 from crgame_ros.drivability.contact import stood_in_the_way
+from crgame_ros.geometry.outline import touches
 from crgame_ros.geometry.reference_point import seen_from, shifted, shifted_velocities
-from crgame_ros.geometry.shape import Shape, touches
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.simulation.contacts import Contact, Motions, motions_of
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.simulation.setup import AvSetup

@@ -29,12 +29,14 @@ from crgame_ros.analysis.criticality.own_path import OwnPaths
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.curve import Curve
-from crgame_ros.geometry.reference_point import shifted, shifted_velocities, zero_for_nan
-from crgame_ros.recording.run_trajectories import RunTrajectories
+from crgame_ros.geometry.reference_point import (
+    shifted,
+    shifted_velocities,
+    zero_for_nan,
+)
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import goal_lanelets
-from crgame_ros.scenario.loading import parse_scenario
-from crgame_ros.simulation.observer import documented_run, ObservedRun
+from crgame_ros.simulation.observer import ObservedRun
 from crgame_ros.units import unit_symbol
 from crgame_ros.vehicle.state import pose_rates, StateColumn
 import numpy as np
@@ -423,27 +425,3 @@ def _compute_leader_measures(gap: float, speed: float, leader_speed: float, acce
 
 # The measures of car following to one that is not the leader.
 WITHOUT_LEADER = _compute_leader_measures(math.nan, 0.0, 0.0, 0.0, 0.0)
-
-
-def measure_log(log: RunTrajectories, thresholds: Thresholds = USUAL,
-                progress: Callable[[float], object] = lambda _: None,
-                on_tick: Callable[[Criticality], object] = lambda _: None) -> Criticality:
-    """
-    Measure every scenario step of a run.
-
-    :param log: log of a recording (`read_trajectories`) or an offline run (`trajectories_of`).
-    :param progress: called with the share measured so far, 0 to 1.
-    :param on_tick: called with the observer after each step, to read its results.
-    :raises InputError: if the scenario in the log cannot be used.
-    """
-    game = log.game
-    loaded = parse_scenario(log.xml_text, '/scenario/xml')
-    run = documented_run(game, loaded, log.descriptions)
-    criticality = Criticality(run, thresholds)
-    for row, k in enumerate(log.ks.tolist()):
-        n = (k - game.scheduler.k0) * game.scheduler.steps_per_tick
-        criticality.observe(n, 0.0, log.published_states[row],
-                            ObjectStates(log.object_poses[row], log.object_velocities[row]))
-        on_tick(criticality)
-        progress((row + 1) / len(log.ks))
-    return criticality

@@ -12,8 +12,8 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.geometry.shape import outline, placed
 import numpy as np
 from numpy.typing import NDArray
 import shapely

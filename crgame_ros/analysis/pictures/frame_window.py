@@ -8,8 +8,8 @@ import math
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.geometry.shape import outline, placed
 from crgame_ros.recording.run_trajectories import RunTrajectories
 import numpy as np
 from numpy.typing import NDArray

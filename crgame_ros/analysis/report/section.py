@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from html import escape
 import math
 import re
-from typing import Literal
+from typing import Literal, TYPE_CHECKING
 
-from crgame_ros.analysis.runs.run import Run
 from crgame_ros.game.objects import Role
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from crgame_ros.analysis.runs.run import Run
 
 # Colours of vehicles by role, in order; the page's style declares them.
 _COLOURS = {Role.HUMAN: ('human-0', 'human-1', 'human-2'),
@@ -114,7 +116,7 @@ class Section:
     plots: tuple[Plot, ...] = ()
 
 
-def colours_of(run: Run) -> dict[str, str]:
+def colours_of(run: 'Run') -> dict[str, str]:
     """Return the name of each driven vehicle's colour."""
     found: dict[str, str] = {}
     for role, names in _COLOURS.items():

@@ -277,7 +277,7 @@ class Run:
         :param on_tick: called at each scenario step.
         :raises InputError: if its scenario cannot be used.
         """
-        from crgame_ros.analysis.criticality.criticality import measure_log
+        from crgame_ros.analysis.criticality.recorded import measure_log
         self._criticality = measure_log(
             self.log, progress=self.telling('measuring'), on_tick=on_tick)
         return self._criticality

@@ -8,7 +8,7 @@ import math
 from crgame_ros.analysis.scores.route_progress import LanesDriven
 from crgame_ros.analysis.scores.scored_drive import ScoredDrive, Track, TrackKind
 from crgame_ros.drivability.contact import Kind
-from crgame_ros.geometry.shape import outline, placed
+from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.vehicle.state import REST
 import numpy as np
 from numpy.typing import NDArray

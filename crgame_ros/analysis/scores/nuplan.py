@@ -25,7 +25,7 @@ from crgame_ros.analysis.scores.route_progress import (
 )
 from crgame_ros.analysis.scores.scored_drive import ScoredDrive, Track, TrackKind
 from crgame_ros.errors import InputError
-from crgame_ros.geometry.shape import outline, placed
+from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.roads.boundary import RoadBoundary
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets, start_lanelet

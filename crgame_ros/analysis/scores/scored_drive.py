@@ -8,8 +8,9 @@ import functools
 from typing import Literal, TypeAlias
 
 from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.geometry.shape import outline, placed, Shape
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles

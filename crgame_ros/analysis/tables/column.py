@@ -6,10 +6,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import json
 import math
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
-from crgame_ros.analysis.runs.run import Run
 import pyarrow as pa
+
+if TYPE_CHECKING:
+    from crgame_ros.analysis.runs.run import Run
 
 NUMBER, INTEGER, TEXT, FLAG = pa.float64(), pa.int64(), pa.string(), pa.bool_()
 
@@ -117,7 +119,7 @@ class TablePart:
     """
 
     columns: tuple[Column, ...]
-    values: Callable[[Run], Mapping[str, Sequence[object]]]
+    values: 'Callable[[Run], Mapping[str, Sequence[object]]]'
 
 
 def declare(name: str, row: str, key: tuple[str, ...],
@@ -126,7 +128,7 @@ def declare(name: str, row: str, key: tuple[str, ...],
     return TableDeclaration(name, row, key, (column for part in parts for column in part.columns))
 
 
-def part_rows(parts: Sequence[TablePart], run: Run) -> dict[str, Any]:
+def part_rows(parts: Sequence[TablePart], run: 'Run') -> dict[str, Any]:
     """
     Return all columns of a run's rows.
 

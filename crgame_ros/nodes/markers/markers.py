@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from crgame_ros.game.documents import Signals
 from crgame_ros.game.objects import ObjectStates
+from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.geometry.shape import outline, placed
 from crgame_ros.messages.joints import JointSeries, vehicle_joint_names
 from crgame_ros.messages.request_layout import RequestLayout
 from crgame_ros.nodes.markers import bodies

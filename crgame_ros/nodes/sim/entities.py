@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.geometry.outline import outline, placed_at
 from crgame_ros.geometry.reference_point import ahead
-from crgame_ros.geometry.shape import outline, placed_at
 from crgame_ros.messages.joints import vehicle_to_joints
 from crgame_ros.nodes.sim.name_pattern import NamePattern
 from crgame_ros.simulation.engine import Simulation

@@ -5,7 +5,7 @@
 from typing import Annotated, Literal
 
 from crgame_ros.schema.document_marks import Bounded
-from crgame_ros.schema.json_documents import HexKey, Message, MessageId, MessageReader, Words
+from crgame_ros.schema.messages import HexKey, Message, MessageId, MessageReader, Words
 from pydantic import AfterValidator, Field, StringConstraints
 
 # Enough for a page of questions with long texts, at four bytes per character.

@@ -13,7 +13,8 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.game.objects import ObjectDescription, Role
-from crgame_ros.geometry.shape import outline, placed, Shape
+from crgame_ros.geometry.outline import outline, placed
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.traffic.compiling.compiled import compiled
 from crgame_ros.traffic.fleet.agents import Agents, AgentTable, REAR_TO_CENTER, write_centers
 from crgame_ros.traffic.following.longitudinal import COASTING, envelope_of

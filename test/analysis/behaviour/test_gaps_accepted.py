@@ -7,7 +7,7 @@ import math
 from crgame_ros.analysis.behaviour.gaps_accepted import AcceptedGap, gap_in_lane
 from crgame_ros.analysis.behaviour.lane_visits import LaneStrip
 from crgame_ros.geometry.curve import Curve
-from crgame_ros.geometry.shape import placed_at
+from crgame_ros.geometry.outline import placed_at
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -3,7 +3,7 @@
 """Crossing paths: the time between one leaving and the other entering the conflict area."""
 
 from crgame_ros.analysis.criticality.encroachment import EncroachmentDetector, WayCrossed
-from crgame_ros.geometry.shape import placed
+from crgame_ros.geometry.outline import placed
 import numpy as np
 from numpy.typing import NDArray
 import pytest

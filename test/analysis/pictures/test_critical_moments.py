@@ -4,7 +4,7 @@
 
 from collections.abc import Callable
 
-from crgame_ros.analysis.criticality.criticality import measure_log
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.pictures.critical_moments import critical_moments, Moment, Touch
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.recording.run_record import RunRecord

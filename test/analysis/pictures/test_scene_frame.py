@@ -11,8 +11,8 @@ from crgame_ros.analysis.pictures.frames_figure import draw_run, frames_figure, 
 from crgame_ros.analysis.pictures.scene_frame import FollowedPlan, FrameScene
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.geometry.shape import outline, placed
 from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from matplotlib.axes import Axes
