@@ -18,9 +18,9 @@ from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.task_spec import answer_key, TaskSpec
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.roads.boundary import lanelet_areas
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signs import stop_line_ends
+from crgame_ros.roads.surface import lanelet_areas
 from crgame_ros.scenario.exact_values import group_outline
 from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.scenario.loading import LaneletHeights, LoadedScenario

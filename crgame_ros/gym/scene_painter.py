@@ -5,7 +5,7 @@
 from crgame_ros.geometry.outline import outline, placed_at
 from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.gym.driving_game import DrivingGame
-from crgame_ros.roads.boundary import lanelet_areas
+from crgame_ros.roads.surface import lanelet_areas
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray

@@ -10,8 +10,8 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from crgame_ros.launcher.finish_process import write_run_report
 from crgame_ros.launcher.interruption import writing
+from crgame_ros.launcher.run_report import write_run_report
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, run_folders
 

@@ -22,7 +22,7 @@ from crgame_ros.game.objects import Role
 from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.occupancy.map_file import INDEX_NAME, map_text, RasterSpec, read_map_file
 from crgame_ros.occupancy.sources import MAX_TILES, tile_name, write_pgm
-from crgame_ros.roads.boundary import (
+from crgame_ros.roads.surface import (
     lanelet_polygons,
     polygons_of,
     road_surface,

@@ -1,16 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The road as a surface, and its boundary: whether a vehicle has left it (CRG III-D b)."""
+"""The road boundary: checks whether a vehicle has left the road (CRG III-D b)."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 import math
 
-from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
+from commonroad.scenario.lanelet import LaneletNetwork
 from commonroad_dc import pycrcc
 from crgame_ros.geometry.outline import Footprint, triangle_corners
 from crgame_ros.geometry.shape import Shape
+from crgame_ros.roads.surface import (
+    lanelet_polygons,
+    polygons_of,
+    road_surface,
+    seam_patches,
+)
 import numpy as np
 from numpy.typing import NDArray
 import shapely
@@ -25,11 +31,6 @@ BOUNDARY_MARGIN = 2000.0
 PIECE_SIZE = 20.0
 # Greatest number of pieces along a side of the map.
 MOST_PIECES = 4000
-# Converted maps leave slits between neighbouring lanelets, a few millimetres to centimetres
-# wide; no vehicle leaves the road through one of them. Ditches and kerbs are wider.
-SEAM_WIDTH = 0.1
-# Patches reach this far into the lanelets around them, so that no slit of rounding width remains.
-PATCH_OVERLAP = 1e-3
 
 
 @dataclass(frozen=True)
@@ -244,78 +245,3 @@ def _cut(area: shapely.Geometry) -> list[shapely.Polygon]:
         pending = np.array(polygons_of(shapely.intersection(np.tile(pending[rows], 2), halves)),
                            dtype=object)
     return done
-
-
-def lanelet_ring(lanelet: Lanelet) -> NDArray[np.float64]:
-    """Return the bounds of a lanelet (n, 2), along the left and back along the right one [m]."""
-    return np.concatenate((lanelet.left_vertices[:, :2], lanelet.right_vertices[::-1, :2]))
-
-
-def lanelet_areas(lanelets: Iterable[Lanelet], origin: tuple[float, float] = (0.0, 0.0),
-                  ) -> NDArray[np.object_]:
-    """
-    Build one valid geometry of each lanelet (L); one that crosses itself is repaired.
-
-    :param lanelets: lanelets with at least two vertices on either side.
-    :param origin: position (x, y) to which the areas are relative [m]
-    """
-    areas = np.array([shapely.Polygon(lanelet_ring(lanelet) - origin) for lanelet in lanelets],
-                     dtype=object)
-    invalid = ~shapely.is_valid(areas)
-    areas[invalid] = shapely.make_valid(areas[invalid])
-    return areas
-
-
-def lanelet_polygons(lanelets: Iterable[Lanelet], origin: tuple[float, float]
-                     ) -> list[shapely.Polygon]:
-    """
-    Build valid polygons of lanelets; one that crosses itself becomes several.
-
-    Parameters as of `lanelet_areas`.
-    """
-    return polygons_of(lanelet_areas(lanelets, origin))
-
-
-def seam_patches(surface: shapely.Geometry) -> list[shapely.Polygon]:
-    """Find polygons that cover every slit and hole in a surface narrower than `SEAM_WIDTH`."""
-    gaps = polygons_of(_closed(surface).difference(surface))
-    # A hole of rounding width is lost in the difference, so holes are checked one by one.
-    gaps += [hole for hole in _holes(surface) if _is_narrow(hole)]
-    # The outline of a gap is widened, not the gap: a polygon of rounding width widens to nothing.
-    covers = shapely.union_all([*gaps, *(gap.exterior.buffer(PATCH_OVERLAP) for gap in gaps)])
-    return [shapely.Polygon(cover.exterior) for cover in polygons_of(covers)]
-
-
-def road_surface(polygons: Sequence[shapely.Polygon],
-                 patches: Sequence[shapely.Polygon]) -> shapely.Geometry:
-    """Return polygons and patches as one surface, prepared for tests of containment."""
-    united = shapely.union_all([*polygons, *patches])
-    # The union has new holes of rounding width along the edges of the patches.
-    surface = shapely.MultiPolygon([
-        shapely.Polygon(part.exterior, [hole.exterior for hole in _holes(part)
-                                        if not _is_narrow(hole)])
-        for part in polygons_of(united)])
-    shapely.prepare(surface)
-    return surface
-
-
-def polygons_of(geometry: shapely.Geometry | NDArray[np.object_]) -> list[shapely.Polygon]:
-    """Return the polygons with an area in a geometry, or in an array of geometries."""
-    parts = shapely.get_parts(shapely.get_parts(geometry))
-    is_polygon = shapely.get_type_id(parts) == shapely.GeometryType.POLYGON
-    polygons: list[shapely.Polygon] = parts[is_polygon & (shapely.area(parts) > 0.0)].tolist()
-    return polygons
-
-
-def _closed(surface: shapely.Geometry) -> shapely.Geometry:
-    half = 0.5 * SEAM_WIDTH
-    return surface.buffer(half, join_style='mitre').buffer(-half, join_style='mitre')
-
-
-def _is_narrow(hole: shapely.Polygon) -> bool:
-    return bool(hole.buffer(-0.5 * SEAM_WIDTH).is_empty)
-
-
-def _holes(geometry: shapely.Geometry) -> list[shapely.Polygon]:
-    return [shapely.Polygon(ring)
-            for polygon in polygons_of(geometry) for ring in polygon.interiors]

@@ -10,8 +10,8 @@ from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
 from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.polyline import EQUAL_DIGITS
-from crgame_ros.roads.boundary import lanelet_areas
 from crgame_ros.roads.signs import LIMITS, sign_elements, speed_limit_of
+from crgame_ros.roads.surface import lanelet_areas
 import numpy as np
 from numpy.typing import NDArray
 import shapely

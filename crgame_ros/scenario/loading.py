@@ -28,7 +28,7 @@ from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.state import InitialState
 from commonroad.scenario.traffic_sign import SupportedTrafficSignCountry
 from crgame_ros.errors import InputError, one_line
-from crgame_ros.roads.boundary import lanelet_ring
+from crgame_ros.roads.surface import lanelet_ring
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.exact_values import exact_position, exact_value, uncertain_values
 from crgame_ros.scenario.format_2017a import upgrade

@@ -25,8 +25,8 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.recording.recorded_plans import read_plans
 from crgame_ros.recording.run_trajectories import RunTrajectories
-from crgame_ros.roads.boundary import lanelet_polygons, polygons_of, road_surface, seam_patches
 from crgame_ros.roads.network import RoadNetwork
+from crgame_ros.roads.surface import lanelet_polygons, polygons_of, road_surface, seam_patches
 from crgame_ros.scenario.loading import parse_scenario
 import numpy as np
 from numpy.typing import NDArray

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from commonroad.common.common_lanelet import LaneletType, RoadUser
 from commonroad.scenario.lanelet import LaneletNetwork
 from crgame_ros.analysis.scores.scored_drive import ScoredDrive
-from crgame_ros.roads.boundary import lanelet_areas
 from crgame_ros.roads.network import RoadNetwork
+from crgame_ros.roads.surface import lanelet_areas
 import numpy as np
 from numpy.typing import NDArray
 import shapely

@@ -35,7 +35,7 @@ from crgame_ros.game.instruments_spec import GazeSpec
 from crgame_ros.game.view_documents import ShownKind
 from crgame_ros.recording.instrument_streams import RecordedStream
 from crgame_ros.recording.views import read_pictures
-from crgame_ros.roads.boundary import lanelet_areas
+from crgame_ros.roads.surface import lanelet_areas
 from crgame_ros.scenario.loading import parse_scenario
 import numpy as np
 from numpy.typing import NDArray
