@@ -111,7 +111,7 @@ def _answer(jobs: Mapping[str, Job], job: dict[str, Any], answers: BinaryIO,
 
 class JobProcess:
     """
-    A process with a module that answers jobs (`job_loop`), started at its first job.
+    A process with a module that answers jobs (`serve_jobs`), started at its first job.
 
     :param module: dotted name of the module.
     :param subject: readable name of what its jobs read: scenario or run.

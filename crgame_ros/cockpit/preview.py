@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Jobs that read scenarios for the page, in a process of their own (`job_loop`)."""
+"""Jobs that read scenarios for the page, in a process of their own (`job_process`)."""
 
 from collections.abc import Mapping
 from contextlib import suppress

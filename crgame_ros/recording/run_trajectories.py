@@ -119,7 +119,7 @@ def read_trajectories(path: Path, epoch: int | None = None,
     Read a run from a recording: ours or of `ros2 bag record`, finished or cut off.
 
     Gaps of a busy recorder are filled from other topics and from the states around them, as far as
-    `gap_filling` allows; a notice names each gap. If more is missing, the longest piece is
+    `resampling` allows; a notice names each gap. If more is missing, the longest piece is
     returned, because the pieces could only be joined by inventing motion.
 
     :param epoch: which run, where a recording holds several; None for the last.
