@@ -28,6 +28,27 @@ NEXT_REQUEST_S = 40.0
 _LOOK_S = 5.0
 
 _log = logging.getLogger(__name__)
+# Set by the server's guard.
+RIGHTS = web.RequestKey('rights', Rights)
+# The key of the page from which a request comes.
+KEY_HEADER = 'X-Crgame-Key'
+# In the order of the search: most browsers name others, too.
+_BROWSERS = (('Firefox/', 'Firefox'), ('Edg/', 'Edge'), ('OPR/', 'Opera'),
+             ('Chromium/', 'Chromium'), ('Chrome/', 'Chrome'), ('Version/', 'Safari'))
+ACCESS = web.AppKey('access', Access)
+# How long a browser keeps its cookie [s].
+COOKIE_S = 12 * 3600
+_POLICY = 'Content-Security-Policy'
+_FRAMED_BY = 'frame-ancestors'
+_HEADERS = {
+    _POLICY: (
+        "default-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+        f"connect-src 'self'; {_FRAMED_BY} 'none'; base-uri 'none'; form-action 'none'"),
+    'X-Content-Type-Options': 'nosniff',
+    'Referrer-Policy': 'no-referrer',
+    'Cross-Origin-Resource-Policy': 'same-origin',
+    'Server': 'crgame_ros',
+}
 
 
 class Doorkeeper:
@@ -189,28 +210,7 @@ def server_log() -> logging.Logger:
     return log
 
 
-# Set by the server's guard.
-RIGHTS = web.RequestKey('rights', Rights)
-# The key of the page from which a request comes.
-KEY_HEADER = 'X-Crgame-Key'
-# In the order of the search: most browsers name others, too.
-_BROWSERS = (('Firefox/', 'Firefox'), ('Edg/', 'Edge'), ('OPR/', 'Opera'),
-             ('Chromium/', 'Chromium'), ('Chrome/', 'Chrome'), ('Version/', 'Safari'))
 KEEPER = web.AppKey('keeper', Doorkeeper)
-ACCESS = web.AppKey('access', Access)
-# How long a browser keeps its cookie [s].
-COOKIE_S = 12 * 3600
-_POLICY = 'Content-Security-Policy'
-_FRAMED_BY = 'frame-ancestors'
-_HEADERS = {
-    _POLICY: (
-        "default-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
-        f"connect-src 'self'; {_FRAMED_BY} 'none'; base-uri 'none'; form-action 'none'"),
-    'X-Content-Type-Options': 'nosniff',
-    'Referrer-Policy': 'no-referrer',
-    'Cross-Origin-Resource-Policy': 'same-origin',
-    'Server': 'crgame_ros',
-}
 
 
 def granted(request: web.Request) -> Rights:
