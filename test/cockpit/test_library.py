@@ -437,11 +437,11 @@ async def test_a_folder_that_is_gone_or_holds_anything_is_no_error(tmp_path: Pat
 async def test_a_scenario_that_takes_much_of_the_processor_is_given_up(tmp_path: Path) -> None:
     """Its process is ended together with its data; another process reads the next scenario."""
     (tmp_path / 'slow.py').write_text(
-        'from crgame_ros.cockpit import job_loop\n'
+        'from crgame_ros.cockpit.job_process import serve_jobs\n'
         'def spin(path):\n'
         '    while True:\n'
         '        sum(range(1000))\n'
-        "job_loop.serve_jobs({'spin': spin, 'name': lambda path: {'name': path.name}}, 'scenario',"
+        "serve_jobs({'spin': spin, 'name': lambda path: {'name': path.name}}, 'scenario',"
         ' 0.2)\n')
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv('PYTHONPATH', str(tmp_path))

@@ -320,17 +320,16 @@ def test_maps_that_are_refused() -> None:
 SLOW = """
 import os, sys, time
 from pathlib import Path
-from crgame_ros.occupancy import written_map
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.occupancy.map_file import RasterSpec
-from crgame_ros.occupancy.rasterize import Raster
+from crgame_ros.occupancy.rasterize import Raster, write_map
 
 def progress(done, total):
     print(done, total, flush=True)
     time.sleep(60.0)
 
 raster = Raster(load_scenario(Path(sys.argv[1])), RasterSpec())
-written_map.write_map(raster, Path(sys.argv[2]), 'T', progress=progress)
+write_map(raster, Path(sys.argv[2]), 'T', progress=progress)
 """
 
 
