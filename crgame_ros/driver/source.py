@@ -22,14 +22,13 @@ from crgame_ros.driver.watchdog import SeatWatchdog
 from crgame_ros.driver.wheel import IndicatorLever, JoyState, normalize, RawInput, reported
 from crgame_ros.errors import InputError
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
-import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from crgame_ros.driver.device_map import DeviceMap
     from crgame_ros.driver.evdev_device import EvdevDevice
     from crgame_ros.game.objects import ObjectStates
     import numpy as np
+    from numpy.typing import NDArray
 
 JOY_TIMEOUT_S = 0.5
 # A driver in the browser; the cockpit node publishes the commands of the seat itself.
@@ -366,7 +365,7 @@ class ReplayDriver(DriverSource):
         four or five.
     """
 
-    def __init__(self, commands: NDArray[np.float64]) -> None:
+    def __init__(self, commands: 'NDArray[np.float64]') -> None:
         self._commands = [_command(row) for row in commands.tolist()]
         self._recorded = len(self._commands)
         self._end = SeatWatchdog()
