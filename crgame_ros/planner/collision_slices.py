@@ -3,6 +3,7 @@
 """Predicted obstacles as one collision checker for each step of a request."""
 
 import math
+from typing import NamedTuple
 
 from commonroad_dc import pycrcc
 from crgame_ros.errors import PlanningError
@@ -25,6 +26,43 @@ REACH = 15.0
 CORES = (0.0, -0.1, -0.2, -0.4, -0.8)
 # A shrunk obstacle with less than this half size is left out [m].
 SMALLEST = 0.02
+
+
+class _Body(NamedTuple):
+    """
+    An obstacle as the collision checker has it: a circle, or the rectangle around its outline.
+
+    :param half_length: half its size along its heading, the radius of a circle [m], like
+        `half_width` across, which is 0 for a circle.
+    :param along: the rectangle's middle from the obstacle's centre [m], like `across`.
+    """
+
+    half_length: float
+    half_width: float
+    along: float
+    across: float
+
+    @classmethod
+    def of(cls, shape: Shape, margin: float) -> '_Body | None':
+        """Return the body of a shape, larger by a margin [m]; None if nothing of it is left."""
+        if shape.kind == 'circle':
+            radius = shape.radius + margin
+            return cls(radius, 0.0, 0.0, 0.0) if radius > SMALLEST else None
+        corners = outline(shape)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        half_length, half_width = (0.5 * (high - low) + margin).tolist()
+        if min(half_length, half_width) <= SMALLEST:
+            return None
+        return cls(half_length, half_width, *(0.5 * (low + high)).tolist())
+
+    def at(self, x: float, y: float, yaw: float) -> pycrcc.RectOBB | pycrcc.Circle:
+        """Return the body at a pose of the obstacle's centre."""
+        if not self.half_width:
+            return pycrcc.Circle(self.half_length, x, y)
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        return pycrcc.RectOBB(self.half_length, self.half_width, yaw,
+                              x + cos * self.along - sin * self.across,
+                              y + sin * self.along + cos * self.across)
 
 
 class _Slice:
@@ -77,18 +115,17 @@ class CollisionSlices:
         poses, _ = prolong(request, steps)
         self._k = request.k
         ego = self._footprint(request.ego)
-        chosen = [(column, margin) for column in self._near(request, poses)
-                  if (margin := self._margin_of(request, poses[0, column], column, ego))
-                  is not None]
+        bodies = {column: body for column in self._near(request, poses).tolist()
+                  if (body := self._body_beside(request, poses[0, column], column, ego))
+                  is not None}
         self._limit.start(request.ego)
         self.road_tolerance = 0.0
         self._slices = []
-        for step in range(steps):
+        for row in poses[:, list(bodies)].tolist():
             checker = pycrcc.CollisionChecker()
-            for column, margin in chosen:
-                body = self._body(request.obstacle_ids[column], poses[step, column], margin)
-                if body is not None:
-                    checker.add_collision_object(body)
+            for body, pose in zip(bodies.values(), row, strict=True):
+                if not math.isnan(pose[0]):
+                    checker.add_collision_object(body.at(*pose))
             self._slices.append(_Slice(checker, self))
 
     def is_off_road(self, body: pycrcc.RectOBB) -> bool:
@@ -106,16 +143,17 @@ class CollisionSlices:
         distance = np.hypot(poses[..., 0] - ego.x, poses[..., 1] - ego.y)
         return np.flatnonzero((np.nan_to_num(distance, nan=np.inf) < reach).any(axis=0))
 
-    def _margin_of(self, request: PlanRequest, pose: Array, column: int,
-                   ego: pycrcc.RectOBB) -> float | None:
-        """Return the enlargement of an obstacle; None leaves it out."""
+    def _body_beside(self, request: PlanRequest, pose: Array, column: int,
+                     ego: pycrcc.RectOBB) -> '_Body | None':
+        """Return the body of an obstacle, enlarged or shrunk; None leaves it out."""
         name = request.obstacle_ids[column]
         if self._follows(request.ego, pose, name):
             return None
+        shape = self._described(name)
         for margin in (self._margin, *CORES):
-            body = self._body(name, pose, margin)
-            if body is None or not ego.collide(body):
-                return margin
+            body = _Body.of(shape, margin)
+            if body is None or math.isnan(pose[0]) or not ego.collide(body.at(*pose.tolist())):
+                return body
         return None
 
     def _follows(self, ego: VehicleState, pose: Array, name: str) -> bool:
@@ -136,23 +174,3 @@ class CollisionSlices:
         if name not in self._objects:
             raise PlanningError(f'the request contains "{name}", which has no description')
         return self._objects[name].shape
-
-    def _body(self, name: str, pose: Array,
-              margin: float) -> pycrcc.RectOBB | pycrcc.Circle | None:
-        """Return an obstacle as a body; a polygon as the rectangle around it."""
-        x, y, yaw = pose.tolist()
-        shape = self._described(name)
-        if math.isnan(x):
-            return None
-        if shape.kind == 'circle':
-            radius = shape.radius + margin
-            return pycrcc.Circle(radius, x, y) if radius > SMALLEST else None
-        corners = outline(shape)
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        along, across = (0.5 * (low + high)).tolist()
-        half_length, half_width = (0.5 * (high - low) + margin).tolist()
-        if min(half_length, half_width) <= SMALLEST:
-            return None
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        return pycrcc.RectOBB(half_length, half_width, yaw, x + cos * along - sin * across,
-                              y + sin * along + cos * across)

@@ -27,6 +27,7 @@ from crgame_ros.planner.interface import PlannerContext  # noqa: E402
 from crgame_ros.planner.path_following import PathPosition  # noqa: E402
 from crgame_ros.planner.path_obstacles import Clearance  # noqa: E402
 from crgame_ros.planner.reference_path import DrivingPath  # noqa: E402
+from crgame_ros.planner.sample_kinematics import feasible, place  # noqa: E402
 from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
 from crgame_ros.vehicle.state import REST, STATE_WIDTH  # noqa: E402
 import numpy as np  # noqa: E402
@@ -84,15 +85,21 @@ def _describe(config: ReactivePlannerConfiguration, vehicle: VehicleParameters) 
 
 class _Planner(package.ReactivePlanner):
     """
-    The package's planner; repaired, as at rest it fails in a message if no sample is feasible.
+    The package's planner, with the kinematics of all samples checked at once.
+
+    It is repaired, too: at rest the package fails in a message if no sample is feasible.
 
     :ivar clearance: of people, which samples keep; None for the package's own checks alone.
     """
 
     clearance: Clearance | None = None
 
+    def _check_kinematics(self, trajectories: list[TrajectorySample], *_: object,
+                          ) -> tuple[list[TrajectorySample], list[TrajectorySample]]:
+        return feasible(self, trajectories), []
+
     def _check_collision_traj_sample(self, trajectory: TrajectorySample) -> bool:
-        if super()._check_collision_traj_sample(trajectory):
+        if not place(self, trajectory) or super()._check_collision_traj_sample(trajectory):
             return True
         if self.clearance is None:
             return False
