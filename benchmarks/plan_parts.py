@@ -14,7 +14,7 @@ from pathlib import Path
 import tempfile
 import time
 
-from crgame_ros.game.file import load_game
+from crgame_ros.game.game import load_game
 from crgame_ros.launcher.run_plan import with_planners
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import JointSeries, plan_to_joints
