@@ -368,3 +368,34 @@ def test_no_agent_stops_on_a_crossing_behind_a_leader_that_will_stop() -> None:
     inside = np.abs(last[:, 0] - 100.0) < 0.5 * (4.5 + 1.8)
     assert not inside.any()
     assert (last[:, 0] > 104.0).any()
+
+
+def test_an_agent_that_has_just_begun_to_roll_halts_before_the_line() -> None:
+    """However soon after green the light changes, who has not passed the line stays before it."""
+    for green in range(12, 24):
+        scenario = lane_with_a_light(((TrafficLightState.RED, 200),
+                                      (TrafficLightState.GREEN, green),
+                                      (TrafficLightState.YELLOW, 3),
+                                      (TrafficLightState.RED, 1000)))
+        poses, _ = support.Run(scenario, TrafficSpec(), 0, (), one()).ticks(300).series(0)
+        fronts = poses[:, 0] + 2.25
+        red = 200 + green + 3
+        assert fronts[red] > 100.0 or np.nanmax(fronts[red:]) <= 100.0, green
+
+
+@pytest.mark.parametrize('away', [70.0, 85.0, 100.0, 115.0])
+def test_who_follows_an_agent_that_turns_into_its_lane_slows_down_in_time(away: float) -> None:
+    """It foresees that the other comes out of a bend, and needs no hard braking behind it."""
+    turn = np.linspace(0.0, 0.5 * np.pi, 20)
+    side = [*((-9.0, y) for y in np.linspace(-80.0, -9.5, 30)),
+            *zip(-9.0 * np.cos(turn), -9.0 + 9.0 * np.sin(turn), strict=True)]
+    roads = support.roads(
+        support.straight_lane(1, 0.0, -200.0, 0.0, successor=[3]),
+        support.lane_strip(2, side, successor=[3]),
+        support.straight_lane(3, 0.0, 0.0, 300.0, predecessor=[1, 2]))
+    run = support.Run(roads, TrafficSpec(), 0, (), [
+        support.driving(1, [(-away, 0.0, 0.0), (290.0, 0.0, 0.0)], 13.0),
+        support.driving(2, [(-9.0, -35.0, np.pi / 2.0), (290.0, 0.0, 0.0)], 7.0)]).ticks(150)
+    speeds = run.series(0)[1]
+    assert run.overlaps() == []
+    assert np.nanmin(np.diff(speeds)) / 0.1 > -2.5

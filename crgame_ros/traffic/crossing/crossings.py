@@ -335,28 +335,42 @@ def _yields(ticks: IntArray, k: int, agents: AgentTable, passage: Passages, meet
 @bare
 def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meetings,
                  at: Situation, i: int) -> float:
-    """Return the distance at which an agent that was let in halts before a taken conflict."""
+    """
+    Return the distance at which an agent that was let in halts, in a junction or behind it [m].
+
+    It halts before a conflict that is taken, and behind an agent that has joined its lane ahead.
+    """
     slot = at.slots[i]
-    result = math.inf
+    result = joined = math.inf
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
         other = meeting.other[n]
-        if meeting.apart[n] or meeting.into[n] >= result or (
-                meeting.step[n] > passage.granted[i]):
+        if meeting.behind[n] < joined and _goes_first(k, agents, passage, meeting, at, i, n):
+            joined = meeting.behind[n]
+        if meeting.apart[n] or meeting.into[n] >= result:
             continue
         # An agent that cannot stop before the conflict any more drives on.
         if agents.speed[slot]**2 > 8.0 * max(meeting.into[n], 0.1):
             continue
-        if other < 0:
-            stops = meeting.inside[n] or meeting.committed[n]
-        else:
-            stops = meeting.inside[n] or (
-                is_let_in(agents, at.slots[other], passage, other, meeting.theirs[n])
-                and _is_senior(k, agents, passage, meeting, at, i, n))
-        if stops:
+        if _goes_first(k, agents, passage, meeting, at, i, n):
             result = meeting.into[n]
             agents.blocker[slot] = at.slots[other] if other >= 0 else other
     # The room before the conflict gets smaller rather than that the agent brakes hard for it.
-    return max(result - BEFORE, min(result, agents.speed[slot]**2 / (2.0 * FIRM)))
+    result = max(result - BEFORE, min(result, agents.speed[slot]**2 / (2.0 * FIRM)))
+    return min(result, joined)
+
+
+@bare
+def _goes_first(k: int, agents: AgentTable, passage: Passages, meeting: Meetings, at: Situation,
+                i: int, n: int) -> bool:
+    """Return whether the other of a meeting goes before an agent that was let in."""
+    other = meeting.other[n]
+    if meeting.step[n] > passage.granted[i]:
+        return False
+    if other < 0:
+        return bool(meeting.inside[n] or meeting.committed[n])
+    return bool(meeting.inside[n]
+                or is_let_in(agents, at.slots[other], passage, other, meeting.theirs[n])
+                and _is_senior(k, agents, passage, meeting, at, i, n))
 
 
 @bare

@@ -6,9 +6,17 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.traffic.compiling.compiled import bare, compiled, inlined
-from crgame_ros.traffic.crossing.junctions import Arrivals, FIRM, Passages, time_to, waits_inside
+from crgame_ros.traffic.crossing.junctions import (
+    Arrivals,
+    BEFORE,
+    FIRM,
+    Passages,
+    time_to,
+    waits_inside,
+)
 from crgame_ros.traffic.fleet.agents import AgentTable
 from crgame_ros.traffic.following.leaders import Ways
+from crgame_ros.traffic.following.longitudinal import AT_LINE
 from crgame_ros.traffic.lanes.conflicts import ConflictTable, extent, spare_room, touch
 from crgame_ros.traffic.lanes.lane_graph import FloatArray, IntArray
 from crgame_ros.vehicle.state import QUEUEING
@@ -22,6 +30,8 @@ HURRY, TIMID = 1.8, 0.7
 # A vehicle lets another go first that waits, if it can halt with this braking [m/s^2] after this
 # time [s].
 GENTLE, REACTION = 1.5, 1.5
+# An agent halts this far behind another that joins its lane [m].
+BEHIND = 2.0
 # In a roundabout, an agent above this share of the speed that the road allows drives freely.
 FREELY = 0.85
 
@@ -105,6 +115,8 @@ class Meetings(NamedTuple):
     :param courteous: (M) whether the other can let the agent go by slowing down gently.
     :param gentle: (M) whether the agent can let the other go in this way.
     :param tapers: (M) as in `ConflictTable`.
+    :param behind: (M) distance of the agent's front from where it halts behind the other if that
+        joins the agent's lane ahead of it and then halts gently, or inf [m]
     """
 
     begin: IntArray
@@ -119,6 +131,7 @@ class Meetings(NamedTuple):
     courteous: BoolArray
     gentle: BoolArray
     tapers: BoolArray
+    behind: FloatArray
 
 
 @compiled
@@ -214,7 +227,8 @@ def _empty(agents: int, room: int) -> Meetings:
         np.zeros(agents + 1, np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
         np.empty(room, np.int64), np.empty(room), np.empty(room, np.int64),
         np.empty(room, np.bool_), np.empty(room, np.bool_), np.empty(room, np.bool_),
-        np.empty(room, np.bool_), np.empty(room, np.bool_), np.empty(room, np.bool_))
+        np.empty(room, np.bool_), np.empty(room, np.bool_), np.empty(room, np.bool_),
+        np.empty(room))
 
 
 @bare
@@ -309,3 +323,5 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable,
     found.gentle[n] = _can_let_go(
         here, arrivals.speed[mine], owner >= 0 and agents.blocker[at.slots[i]] == at.slots[owner])
     found.tapers[n] = conflicts.tapers[conflict]
+    found.behind[n] = here + max(speed**2 / (2.0 * AT_LINE) - clear - BEHIND, -BEFORE) if (
+        joins and here > max(clear, 0.0)) else math.inf

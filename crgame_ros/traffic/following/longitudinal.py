@@ -26,6 +26,9 @@ LOOKS = (0.3, 0.6, 1.0)
 AT_LINE, AT_END = 1.6, 3.0
 # Agents halt at this gap before a line, and a standing agent this near to it stays [m].
 LINE_GAP, NEAR = 0.5, 0.3
+# An agent that has reached the place where it halts still takes this way [m]: the shorter one
+# unless it would have to brake harder than `EMERGENCY` for that.
+LINE_WAYS = 0.05, 0.2
 # Room that an agent needs before a standing obstacle to get into the next lane [m], and the number
 # of its lengths that it needs at least.
 SWING_OUT, SWING_LENGTHS = 10.0, 2.0
@@ -106,12 +109,15 @@ def halt_before(speed: float, distance: float, braking: float) -> float:
         return math.inf
     if speed < QUEUEING and distance < NEAR:
         return -1.0
+    needed = speed * speed / (2.0 * max(distance, LINE_WAYS[1]))
+    needed = max(needed, min(speed * speed / (2.0 * max(distance, LINE_WAYS[0])), EMERGENCY))
+    if needed > braking:
+        return -needed
     result = math.inf
     for look in LOOKS:
         allowed = math.sqrt(2.0 * braking * max(distance - speed * look, 0.0))
         result = min(result, (allowed - speed) / look)
-    needed = speed * speed / (2.0 * max(distance, 0.2))
-    return max(result, -max(needed, braking))
+    return max(result, -braking)
 
 
 @compiled
