@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 
 from cockpit import Browser, free_port
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.timing.time_slice import shorten_time_slice
+from crgame_ros.timing.thread_counters import shorten_time_slice
 from crowd import GAME
 from live_graph import LiveGraph
 import numpy as np

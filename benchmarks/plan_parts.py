@@ -16,8 +16,7 @@ import time
 
 from crgame_ros.game.game import load_game
 from crgame_ros.launcher.run_plan import with_planners
-from crgame_ros.messages.joint_messages import from_joint_trajectory
-from crgame_ros.messages.joints import JointSeries, plan_to_joints
+from crgame_ros.messages.joints import from_joint_trajectory, JointSeries, plan_to_joints
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.manager import PlannerManager
@@ -123,7 +122,7 @@ def main() -> None:
         crowd = Path(name) / 'crowd.yaml'
         crowd.write_text(CROWD.format(scenarios=scenarios_directory()))
         print(f'{"median [ms]":32}{"p50":>7}{"p99":>7}{"worst":>7}  '
-              + ''.join(f'{part:>18}' for part in (*PARTS, REST)))
+              + ''.join(f'{part:>24}' for part in (*PARTS, REST)))
         for title, game in (('cut-in', scenarios_directory() / 'cut_in.yaml'),
                             ('60 others', crowd)):
             for planner in PLANNERS:
@@ -135,7 +134,7 @@ def main() -> None:
                 bars[f'{planner}, {title}'] = medians
                 print(f'{f"{planner}, {title}":32}{whole["p50"]:7.2f}{whole["p99"]:7.2f}'
                       f'{whole["max"]:7.2f}  '
-                      + ''.join(f'{value:18.3f}' for value in medians.values())
+                      + ''.join(f'{value:24.3f}' for value in medians.values())
                       + f'  planned p99 {np.percentile(times["planned"], 99):.2f}  '
                       + WANTED.get(planner, ''), flush=True)
     if values.picture is not None:
