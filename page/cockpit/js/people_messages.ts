@@ -3,7 +3,7 @@
 /**
  * Types of the server's messages about people: no code here.
  *
- * The server's side is crgame_ros/cockpit/hub.py and crgame_ros/nodes/cockpit/people_feed.py.
+ * The server's side is crgame_ros/cockpit/hub.py.
  */
 
 /** The rights of this page: `directs` and `drives` are in use, `may_…` are granted. */
