@@ -208,10 +208,6 @@ def _messages() -> Any:
         yield waiting.pop(0)
 
 
-if __name__ == '__main__':
-    main()
-
-
 def dask_setup(_worker: object) -> None:
     """Ignore Ctrl-C in the worker: the command handles it, and ends its workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -273,3 +269,7 @@ def compute(batch: str, contents: Mapping[str, Mapping[str, bytes]],
         if time.monotonic() > end_s:
             break
     return done
+
+
+if __name__ == '__main__':
+    main()

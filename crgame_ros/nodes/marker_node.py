@@ -198,10 +198,6 @@ def main(args: list[str] | None = None) -> None:
     run_node(MarkerNode, args)
 
 
-if __name__ == '__main__':
-    main()
-
-
 def transform(parent: str, child: str, pose: Iterable[float], stamp_ns: int) -> TransformStamped:
     """
     Return the pose of a frame in another one.
@@ -270,3 +266,7 @@ class Transforms:
         if self.wanted:
             self._moving.publish(self._message(
                 transforms=vehicle_transforms(vehicle_ids, poses, stamp_ns)))
+
+
+if __name__ == '__main__':
+    main()

@@ -167,10 +167,6 @@ def main(args: list[str] | None = None) -> None:
     run_node(PerceptionNode, args)
 
 
-if __name__ == '__main__':
-    main()
-
-
 class LocalizationMessage:
     """
     The estimated pose and speed with their covariance.
@@ -238,3 +234,7 @@ class ScanMessages:
             message.header.frame_id = f'{self._av_id}/{spec.name}'
             set_time(message.header.stamp, scheduler.stamp_ns(n))
             self._publisher.publish(message)
+
+
+if __name__ == '__main__':
+    main()

@@ -182,10 +182,6 @@ def main(args: list[str] | None = None) -> None:
     run_node(SimNode, args)
 
 
-if __name__ == '__main__':
-    main()
-
-
 def refuse_another(node: Node, until_s: float) -> None:
     """
     Check that no other simulation publishes here: two on the same topics would mix.
@@ -216,3 +212,7 @@ def refuse_another(node: Node, until_s: float) -> None:
         if message is None:
             time.sleep(0.01)
     endpoints.release(heard)
+
+
+if __name__ == '__main__':
+    main()
