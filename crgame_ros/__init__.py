@@ -42,9 +42,9 @@ _PLACES = {
     'Planner': 'planner.interface', 'PlannerContext': 'planner.interface',
     'Run': 'python_interface.finished_run',
     'load_game': 'python_interface.games', 'run': 'python_interface.offline_runs',
-    'read_run': 'python_interface.recorded_runs', 'replay': 'python_interface.replays',
-    'export': 'python_interface.run_functions', 'measure': 'python_interface.run_functions',
-    'report': 'python_interface.run_functions'}
+    'read_run': 'python_interface.recorded_runs', 'replay': 'python_interface.recorded_runs',
+    'export': 'python_interface.recorded_runs', 'measure': 'python_interface.recorded_runs',
+    'report': 'python_interface.recorded_runs'}
 
 
 def __dir__() -> list[str]:
