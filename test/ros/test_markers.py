@@ -224,7 +224,7 @@ def test_objects_stand_at_their_centres(setup: Setup, scene: SceneMarkers) -> No
 def test_colour_tells_the_role(kind: str, role: Role, code: str) -> None:
     """The palette of Okabe and Ito: people outside cars by what they are, others by role."""
     body = Body(bodies.map_header(), 0, ObjectDescription('o1', kind, role,
-                                                         Shape.rectangle(4.0, 2.0)))
+                                                          Shape.rectangle(4.0, 2.0)))
     assert _rgb(body.markers[0]) == code
 
 
@@ -232,7 +232,7 @@ def test_a_polygon_is_filled() -> None:
     """The triangles of an L of 3 m^2 have its area, and its corners."""
     corners = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
     body = Body(bodies.map_header(), 0, ObjectDescription('o1', 'building', Role.STATIC,
-                                                         Shape.polygon(corners)))
+                                                          Shape.polygon(corners)))
     triangles = _points(body.markers[0]).reshape(-1, 3, 2)
     first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     areas = 0.5 * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])

@@ -90,7 +90,7 @@ def _roads(network: LaneletNetwork) -> Iterator[Marker]:
     for number, (for_cars, code, z) in enumerate((
             (True, bodies.ROAD, ROAD_Z), (False, bodies.PATHS, PATHS_Z))):
         marker = bodies.blank(bodies.map_header(), 'road', number, Marker.TRIANGLE_LIST,
-                             bodies.colour(code))
+                              bodies.colour(code))
         chosen = [_surface(lanelet) for lanelet in network.lanelets
                   if roads.is_drivable(lanelet.lanelet_id) == for_cars]
         if chosen:
@@ -113,7 +113,7 @@ def _lane_lines(network: LaneletNetwork) -> Iterator[Marker]:
             segments[paint] += line_segments(points, aside, dashed)
     for number, paint in enumerate(PAINTS):
         marker = bodies.blank(bodies.map_header(), 'lane_lines', number, Marker.LINE_LIST,
-                             bodies.colour(paint.colour), (paint.width, 0.0, 0.0))
+                              bodies.colour(paint.colour), (paint.width, 0.0, 0.0))
         if segments[paint]:
             marker.points = bodies.points(np.concatenate(segments[paint]).tolist(), paint.z)
         yield marker
@@ -169,7 +169,7 @@ def _pairs(places: FloatArray) -> FloatArray:
 
 def _stop_lines(network: LaneletNetwork) -> Iterator[Marker]:
     marker = bodies.blank(bodies.map_header(), 'stop_lines', 0, Marker.LINE_LIST,
-                         bodies.colour(bodies.WHITE), (STOP_LINE_WIDTH, 0.0, 0.0))
+                          bodies.colour(bodies.WHITE), (STOP_LINE_WIDTH, 0.0, 0.0))
     ends = [stop_line_ends(lanelet) for lanelet in network.lanelets
             if lanelet.stop_line is not None]
     if ends:
@@ -180,7 +180,7 @@ def _stop_lines(network: LaneletNetwork) -> Iterator[Marker]:
 def _goals(problems: Sequence[PlanningProblem]) -> Iterator[Marker]:
     for number, problem in enumerate(problems):
         marker = bodies.blank(bodies.map_header(), 'goals', number, Marker.LINE_LIST,
-                             bodies.colour(bodies.SKY_BLUE, 0.8), (0.25, 0.0, 0.0))
+                              bodies.colour(bodies.SKY_BLUE, 0.8), (0.25, 0.0, 0.0))
         for state in problem.goal.state_list:
             shape = getattr(state, 'position', None)
             if shape is not None:
