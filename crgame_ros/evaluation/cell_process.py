@@ -158,37 +158,6 @@ def _read(stream: Any, timeout_s: float) -> bytes:
     return data[_LENGTH.size:]
 
 
-def main() -> NoReturn:
-    """Compute the cells from standard input until it ends; write results to standard output."""
-    contents, memory_bytes = Path(sys.argv[1]), int(sys.argv[2])
-    # Ctrl-C is for the parent process; this one ends together with it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    answers = os.fdopen(os.dup(1), 'wb')
-    # Output of planners must not mix with the results.
-    os.dup2(2, 1)
-    from crgame_ros.evaluation.cell import cell_of
-    from crgame_ros.evaluation.cell_run import compute_cell
-    from crgame_ros.evaluation.content import PREFIX
-    resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))
-    _write(answers, b'')
-    for text in _messages():
-        with suppress(OSError):
-            os.ftruncate(2, 0)
-        try:
-            rows = compute_cell(cell_of(text), contents)
-        except MemoryError:
-            rows = _failed('memory', f'it wanted more than {memory_bytes / 1e9:g} GB',
-                           traceback.format_exc())
-        except CrgameError as error:
-            rows = _failed('error', str(error))
-        except Exception as error:
-            rows = _failed('error', f'{type(error).__name__}: {error}', traceback.format_exc())
-        # The folder of the files differs between machines.
-        here = json.dumps(f'{contents}/')[1:-1]
-        _write(answers, json.dumps(rows).replace(here, PREFIX).encode())
-    sys.exit(0)
-
-
 def _messages() -> Any:
     """Yield the texts of cells; end the process at once when the parent is gone."""
     waiting: list[str] = []
@@ -269,6 +238,37 @@ def compute(batch: str, contents: Mapping[str, Mapping[str, bytes]],
         if time.monotonic() > end_s:
             break
     return done
+
+
+def main() -> NoReturn:
+    """Compute the cells from standard input until it ends; write results to standard output."""
+    contents, memory_bytes = Path(sys.argv[1]), int(sys.argv[2])
+    # Ctrl-C is for the parent process; this one ends together with it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    answers = os.fdopen(os.dup(1), 'wb')
+    # Output of planners must not mix with the results.
+    os.dup2(2, 1)
+    from crgame_ros.evaluation.cell import cell_of
+    from crgame_ros.evaluation.cell_run import compute_cell
+    from crgame_ros.evaluation.content import PREFIX
+    resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))
+    _write(answers, b'')
+    for text in _messages():
+        with suppress(OSError):
+            os.ftruncate(2, 0)
+        try:
+            rows = compute_cell(cell_of(text), contents)
+        except MemoryError:
+            rows = _failed('memory', f'it wanted more than {memory_bytes / 1e9:g} GB',
+                           traceback.format_exc())
+        except CrgameError as error:
+            rows = _failed('error', str(error))
+        except Exception as error:
+            rows = _failed('error', f'{type(error).__name__}: {error}', traceback.format_exc())
+        # The folder of the files differs between machines.
+        here = json.dumps(f'{contents}/')[1:-1]
+        _write(answers, json.dumps(rows).replace(here, PREFIX).encode())
+    sys.exit(0)
 
 
 if __name__ == '__main__':

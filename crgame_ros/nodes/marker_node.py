@@ -193,11 +193,6 @@ class MarkerNode(Node):
             self.get_logger().error(str(error))
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(MarkerNode, args)
-
-
 def transform(parent: str, child: str, pose: Iterable[float], stamp_ns: int) -> TransformStamped:
     """
     Return the pose of a frame in another one.
@@ -266,6 +261,11 @@ class Transforms:
         if self.wanted:
             self._moving.publish(self._message(
                 transforms=vehicle_transforms(vehicle_ids, poses, stamp_ns)))
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run_node(MarkerNode, args)
 
 
 if __name__ == '__main__':

@@ -162,11 +162,6 @@ class PerceptionNode(Node):
         self._perceived.publish(self._message.fill(request))
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(PerceptionNode, args)
-
-
 class LocalizationMessage:
     """
     The estimated pose and speed with their covariance.
@@ -234,6 +229,11 @@ class ScanMessages:
             message.header.frame_id = f'{self._av_id}/{spec.name}'
             set_time(message.header.stamp, scheduler.stamp_ns(n))
             self._publisher.publish(message)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run_node(PerceptionNode, args)
 
 
 if __name__ == '__main__':

@@ -177,11 +177,6 @@ class SimNode(Node):
                 '/etc/security/limits.d, or run without realtime_priority')
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(SimNode, args)
-
-
 def refuse_another(node: Node, until_s: float) -> None:
     """
     Check that no other simulation publishes here: two on the same topics would mix.
@@ -212,6 +207,11 @@ def refuse_another(node: Node, until_s: float) -> None:
         if message is None:
             time.sleep(0.01)
     endpoints.release(heard)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    run_node(SimNode, args)
 
 
 if __name__ == '__main__':
