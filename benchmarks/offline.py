@@ -5,13 +5,11 @@ The speed of the offline runner: vehicle steps per second, the cut-in game, and 
 
 A cell is one run of a game from its file on: loading, placing all vehicles, the first step. It is
 cold in a process that has run nothing yet, and warm where this scenario has been run before. CPU
-time of one process, all kinds in turns. With --against, another version of the program does the
-same in a process beside this one, in turns with it.
+time of one process, all kinds in turns. `regressions.py --only offline` compares two versions.
 """
 
 import argparse
 from collections.abc import Callable
-import os
 from pathlib import Path
 import statistics
 import subprocess
@@ -39,8 +37,6 @@ from crgame_ros.vehicle.state import VehicleState
 
 STEPS = 20_000
 COLD_STARTS = 3
-# Before a time that a process tells another.
-TOLD = 'seconds:'
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -107,56 +103,18 @@ class Work:
         self.hashes.add(run_offline(self.setup, duration_s=20.0, check_drivability=checked,
                                     observers=observers).state_hash)
 
-    def serve(self) -> None:
-        """Do the kinds that are named on standard input, a line each; tell their times [s]."""
-        for line in sys.stdin:
-            print(TOLD, seconds(self.kinds[line.rstrip('\n')][0]), flush=True)
-
-
-def compare(work: Work, other: Path, rounds: int) -> None:
-    """Time this version and another one in turns, and print both."""
-    process = subprocess.Popen(
-        [sys.executable, str(Path(__file__).resolve()), '--serve'], text=True, cwd=other,
-        env=os.environ | {'PYTHONPATH': str(other)}, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-    assert process.stdin is not None and process.stdout is not None
-
-    def theirs(name: str) -> float:
-        print(name, file=process.stdin, flush=True)
-        return next(float(line.removeprefix(TOLD)) for line in process.stdout or ()
-                    if line.startswith(TOLD))
-
-    times: dict[str, list[tuple[float, float]]] = {name: [] for name in work.kinds}
-    for _ in range(rounds):
-        for name, (own, _) in work.kinds.items():
-            times[name].append((theirs(name), seconds(own)))
-    process.communicate()
-    print(f'{"":42}{"other: least":>14}{"median":>9}{"this: least":>13}{"median":>9}')
-    for name, pairs in times.items():
-        before, now = zip(*pairs, strict=True)
-        print(f'{name:42}{min(before):14.3f}{statistics.median(before):9.3f}{min(now):13.3f}'
-              f'{statistics.median(now):9.3f}')
-
 
 def main() -> None:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--rounds', type=int, default=7)
-    parser.add_argument('--against', type=Path, metavar='FOLDER',
-                        help='of another version of the program, to compare with it in turns')
     parser.add_argument('--cold', action='store_true', help='start one cell, and say how long [s]')
-    parser.add_argument('--serve', action='store_true', help=argparse.SUPPRESS)
     values = parser.parse_args()
     if values.cold:
         print(seconds(start_cell))
         return
     rounds, work = values.rounds, Work()
-    if values.serve:
-        work.serve()
-        return
-    if values.against is not None:
-        compare(work, values.against.resolve(), rounds)
-        return
     vehicle = HumanVehicle(load_vehicle_parameters(), VehicleState(0.0, 0.0, 0.0, 10.0))
     command = DriverCommand(0.2, 0.0, 0.1)
     times: dict[str, list[float]] = {name: [] for name in work.kinds}

@@ -39,7 +39,8 @@ Work = Callable[[], float]
 TOLD = 'told: '
 COMMANDS = ('info', 'validate', 'measure', 'score', 'export', 'report')
 # Kinds of the offline runner, as `benchmarks/offline.py` names them.
-OFFLINE = ('start of a cell, warm', 'cut-in game, 20 s, idm', 'the same with criticality too',
+OFFLINE = ('start of a cell, warm', 'cut-in game, 20 s, idm',
+           'the same with drivability at 100 Hz', 'the same with criticality too',
            'a cell of an evaluation, 10 s', 'a cell of 10 s, all measures and rows')
 TRAFFIC_STEPS, ENVIRONMENT_STEPS, PLANNED_S = 40, 100, 8.0
 
