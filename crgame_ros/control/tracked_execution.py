@@ -3,7 +3,7 @@
 """An AV that tracks its plan with a controller and a vehicle model (FS II-C)."""
 
 from collections import deque
-from math import cos, sin, sqrt
+from math import cos, sin
 from typing import NamedTuple
 
 from crgame_ros.control.planned_track import PlannedTrack
@@ -99,19 +99,11 @@ class TrackedExecution:
         """Return the largest absolute errors since the last reset."""
         return TrackingErrors(*self._worst)
 
-    @property
-    def rms(self) -> TrackingErrors:
-        """Return the root mean square of the errors since the last reset."""
-        count = max(1, self._count)
-        return TrackingErrors(*(sqrt(total / count) for total in self._squares))
-
     def _forget(self) -> None:
         self._errors = None
         # Plans with the time since the first state of each, the oldest first.
         self._plans: deque[tuple[PlannedTrack, float]] = deque()
         self._worst = [0.0, 0.0, 0.0, 0.0]
-        self._squares = [0.0, 0.0, 0.0, 0.0]
-        self._count = 0
 
     def _braking(self, state: VehicleState) -> Control:
         # The tracker's expectations of the vehicle end here.
@@ -146,7 +138,5 @@ class TrackedExecution:
         errors = TrackingErrors(dy * c - dx * s, dx * c + dy * s,
                                 wrap_pi(state.yaw - planned.yaw), state.speed - planned.speed)
         self._errors = errors
-        self._count += 1
         for i, error in enumerate(errors):
             self._worst[i] = max(self._worst[i], abs(error))
-            self._squares[i] += error * error

@@ -68,8 +68,3 @@ class TrafficSpec:
     imperfection: Share = 0.0
     red_runners: Share = 0.0
     late_yielders: Share = 0.0
-
-    @property
-    def is_reactive(self) -> bool:
-        """Return whether there can be any agent."""
-        return self.recorded == 'reactive' or self.agents > 0 or self.flow > 0.0

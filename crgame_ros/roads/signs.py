@@ -188,15 +188,6 @@ class TrafficLights:
         return self._states
 
 
-def traffic_light_states(scenario: Scenario, k: int) -> dict[int, str]:
-    """
-    Return the states of all traffic lights with a cycle at scenario time step k.
-
-    :return: by traffic-light id: red, yellow, redYellow, green or inactive
-    """
-    return TrafficLights(scenario).states_at(k)
-
-
 def governing_lights(lights: list[TrafficLight], arrow: str) -> list[TrafficLight]:
     """
     Return the lights that govern a movement; one that shows red stops it.

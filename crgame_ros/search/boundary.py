@@ -24,8 +24,6 @@ _TOGETHER = 16
 _MOST = 400
 # Candidates of one batch are at least so far apart, in the unit cube.
 _APART = 0.05
-# A variant in this range of probabilities is uncertain.
-UNCERTAIN = (0.05, 0.95)
 # Variants among which the sample is drawn: their mean is that of the distributions.
 POOL = 1 << 14
 # Share of the proposal that is the stated distribution itself, so that no weight exceeds 1/share,

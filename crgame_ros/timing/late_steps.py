@@ -99,11 +99,6 @@ class LateSteps:
         self._worst: list[tuple[float, int, LateStep]] = []
 
     @property
-    def explains_every_cycle(self) -> bool:
-        """Return whether every cycle has its causes; earlier versions did not record them."""
-        return self._told
-
-    @property
     def worst(self) -> list[LateStep]:
         """Return the worst steps, the greatest lateness first."""
         return [step for _, _, step in sorted(self._worst, reverse=True)]

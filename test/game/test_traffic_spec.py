@@ -14,7 +14,6 @@ import pytest
 def test_the_word_reactive_is_enough() -> None:
     assert read(TrafficSpec, 'reactive', 'game') == TrafficSpec(recorded='reactive')
     assert read(TrafficSpec, {}, 'game') == TrafficSpec()
-    assert not TrafficSpec().is_reactive
 
 
 def test_what_is_written_reads_as_the_same() -> None:

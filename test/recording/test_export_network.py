@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 from crgame_ros.recording.export import export_scenario
-from crgame_ros.roads.signs import traffic_light_states
+from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.scenario.loading import parse_scenario
 import pytest
 
@@ -27,8 +27,8 @@ def test_traffic_lights_keep_their_states(
         scenario, _ = runs.read_back(export_scenario(log))
         seen = set()
         for step in range(cycle):
-            states = traffic_light_states(scenario, step)
-            assert states == traffic_light_states(original, step + k0)
+            states = TrafficLights(scenario).states_at(step)
+            assert states == TrafficLights(original).states_at(step + k0)
             seen |= set(states.values())
         assert len(states) == 8 and len(seen) > 1
 
@@ -69,7 +69,7 @@ def test_light_without_a_cycle_is_inactive(runs: Any, tmp_path: Path) -> None:
              '</trafficLight>')
     text = runs.own(CUT_IN).replace('<planningProblem', light + '<planningProblem', 1)
     scenario, _ = runs.read_back(export_scenario(runs.drive(text, tmp_path, duration_s=0.2)))
-    assert traffic_light_states(scenario, 5) == {800: 'inactive'}
+    assert TrafficLights(scenario).states_at(5) == {800: 'inactive'}
 
 
 def test_signs_that_the_schema_does_not_know(runs: Any, tmp_path: Path) -> None:

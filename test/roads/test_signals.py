@@ -11,7 +11,7 @@ from commonroad.scenario.traffic_light import (
     TrafficLightCycleElement,
     TrafficLightState,
 )
-from crgame_ros.roads.signs import traffic_light_states, TrafficLights
+from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.scenario.loading import load_scenario
 import numpy as np
 import pytest
@@ -33,16 +33,16 @@ def test_cycle_in_xml_spelling() -> None:
     """Red 2, yellow 1, redYellow 1, green 3 steps from offset 4, repeated both ways."""
     scenario = scenario_with(2, 1, 1, 3, offset=4)
     names = ['red', 'red', 'yellow', 'redYellow', 'green', 'green', 'green']
-    assert [traffic_light_states(scenario, 4 + i)[5] for i in range(14)] == names * 2
-    assert traffic_light_states(scenario, 3) == {5: 'green'}
-    assert traffic_light_states(scenario, -3) == {5: 'red'}
+    assert [TrafficLights(scenario).states_at(4 + i)[5] for i in range(14)] == names * 2
+    assert TrafficLights(scenario).states_at(3) == {5: 'green'}
+    assert TrafficLights(scenario).states_at(-3) == {5: 'red'}
 
 
 def test_switched_off_and_empty_cycles_are_inactive() -> None:
     """A light that is off, or whose cycle has no duration, has no phase to compute."""
-    assert traffic_light_states(scenario_with(2, 2, active=False), 0) == {5: 'inactive'}
-    assert traffic_light_states(scenario_with(0, 0), 7) == {5: 'inactive'}
-    assert traffic_light_states(Scenario(0.1), 0) == {}
+    assert TrafficLights(scenario_with(2, 2, active=False)).states_at(0) == {5: 'inactive'}
+    assert TrafficLights(scenario_with(0, 0)).states_at(7) == {5: 'inactive'}
+    assert TrafficLights(Scenario(0.1)).states_at(0) == {}
 
 
 def test_real_lights_agree_with_commonroad() -> None:

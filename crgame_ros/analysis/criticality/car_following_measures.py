@@ -57,6 +57,27 @@ class Corner(NamedTuple):
     d: float
 
 
+class Pursuit(NamedTuple):
+    """
+    How a subject follows its leader; speeds and accelerations count along the subject's path.
+
+    :param gap: from the subject's front to the leader's rear [m]; NaN without a leader
+    :param speed: of the subject [m/s]
+    :param leader_speed: of the leader [m/s]
+    :param acceleration: of the subject [m/s^2]
+    :param leader_acceleration: of the leader [m/s^2]
+    """
+
+    gap: float
+    speed: float
+    leader_speed: float
+    acceleration: float
+    leader_acceleration: float
+
+
+NO_LEADER = Pursuit(math.nan, 0.0, 0.0, 0.0, 0.0)
+
+
 def find_leader(seen: SeenPath, others: FloatArray, radii: FloatArray,
                 touching: NDArray[np.bool_]) -> Ahead | None:
     """

@@ -17,6 +17,8 @@ from crgame_ros.analysis.criticality.car_following_measures import (
     Corner,
     deceleration_to_avoid_crash,
     find_leader,
+    NO_LEADER,
+    Pursuit,
     required_acceleration,
     time_gap,
     time_to_collision,
@@ -59,6 +61,8 @@ class Measure(NamedTuple):
     :param short: for people who know it, of the few that are plotted, compared and averaged.
     :param most: greater values count as this one in means: they result from speeds that are almost
         equal or gaps that are almost closed.
+    :param of_leader: how it follows from the pursuit of the leader; None where it is measured to
+        everybody near, from the footprints (`NearbyFootprints.approach`).
     """
 
     unit: str
@@ -68,6 +72,7 @@ class Measure(NamedTuple):
     definition: str
     short: str = ''
     most: float = math.inf
+    of_leader: Callable[[Pursuit], float] | None = None
 
     @property
     def symbol(self) -> str:
@@ -89,33 +94,39 @@ class Measure(NamedTuple):
         return self.unit != 's' or value < LONGEST_S
 
 
-# In the order of the columns of `TickMeasures.values`.
+# In the order of the columns of `TickMeasures.values`: those of the leader come first.
 MEASURES = {
     'gap': Measure('m', -1, math.nan, 'Gap to the leader',
-                   "from the subject's front to the leader's rear along its own path", 'gap'),
-    'time_gap': Measure('s', -1, math.inf, 'Time gap',
-                        "gap divided by the subject's speed"),
+                   "from the subject's front to the leader's rear along its own path", 'gap',
+                   of_leader=lambda of: of.gap),
+    'time_gap': Measure('s', -1, math.inf, 'Time gap', "gap divided by the subject's speed",
+                        of_leader=lambda of: time_gap(of.gap, of.speed)),
     'thw': Measure('s', -1, math.inf, 'Time headway (THW)',
                    "time until the subject's front is where the leader's rear is now", 'THW',
-                   20.0),
+                   20.0, lambda of: time_gap(of.gap, of.speed)),
     'ttc': Measure('s', -1, math.inf, 'Time to collision (TTC)',
-                   'gap divided by the closing speed along the path', 'TTC', 20.0),
+                   'gap divided by the closing speed along the path', 'TTC', 20.0,
+                   lambda of: time_to_collision(of.gap, of.speed, of.leader_speed)),
     'ttc_a': Measure('s', -1, math.inf, 'TTC with accelerations',
-                     'the same where each keeps its acceleration until it stands'),
+                     'the same where each keeps its acceleration until it stands',
+                     of_leader=lambda of: time_to_collision_accelerating(*of)),
     'drac': Measure('m/s^2', 1, 0.0, 'Deceleration to avoid a crash (DRAC)',
-                    'half the squared closing speed divided by the gap', 'DRAC', 20.0),
+                    'half the squared closing speed divided by the gap', 'DRAC', 20.0,
+                    lambda of: deceleration_to_avoid_crash(of.gap, of.speed, of.leader_speed)),
     'a_req': Measure('m/s^2', -1, 0.0, 'Required acceleration',
-                     'constant acceleration that just avoids contact'),
+                     'constant acceleration that just avoids contact',
+                     of_leader=lambda of: required_acceleration(
+                         of.gap, of.speed, of.leader_speed, of.leader_acceleration)),
     'ttc_2d': Measure('s', -1, math.inf, 'TTC in the plane',
                       'time until footprints touch that keep velocity and yaw'),
     'min_distance': Measure('m', -1, math.nan, 'Distance',
                             'distance of the footprints', 'distance'),
 }
+_OF_LEADER = [measure.of_leader for measure in MEASURES.values() if measure.of_leader]
 # Those that are plotted, compared and averaged.
 CHIEF = {name: measure for name, measure in MEASURES.items() if measure.short}
 COLUMN = {name: column for column, name in enumerate(MEASURES)}
 UNDEFINED = np.array([measure.undefined for measure in MEASURES.values()])
-_OF_LEADER = COLUMN['ttc_2d']
 _SENSES = np.array([float(measure.worst) for measure in MEASURES.values()])
 
 
@@ -353,7 +364,7 @@ class Criticality:
         for subject, others, place, pairs in zip(
                 subjects, near, scenes, footprints.approach(subjects, near, scenes), strict=True):
             values = np.empty((len(others), len(MEASURES)))
-            values[:, :_OF_LEADER], values[:, _OF_LEADER:] = WITHOUT_LEADER, pairs
+            values[:, :len(_OF_LEADER)], values[:, len(_OF_LEADER):] = _WITHOUT_LEADER, pairs
             following = self._follow(subject, others, place, values)
             found.append(TickMeasures(subject, others, values, following))
         return tuple(found)
@@ -373,8 +384,8 @@ class Criticality:
         (speed, acceleration), (leader_speed, leader_acceleration) = (
             _rates_along(seen.path.line, corner, scene, number) for corner, number in (
                 (leader.front, subject), (leader.rear, int(others[leader.number]))))
-        values[leader.number, :_OF_LEADER] = _compute_leader_measures(
-            leader.gap, speed, leader_speed, acceleration, leader_acceleration)
+        pursuit = Pursuit(leader.gap, speed, leader_speed, acceleration, leader_acceleration)
+        values[leader.number, :len(_OF_LEADER)] = [measure(pursuit) for measure in _OF_LEADER]
         number = int(others[leader.number])
         return Following(leader.gap, leader.headway, speed, number, leader_speed,
                          _comes_aside(seen.path.line, leader, scene, number))
@@ -412,16 +423,5 @@ def _comes_aside(path: Curve, leader: Ahead, scene: Scene, number: int) -> float
         vy * math.cos(heading) - vx * math.sin(heading))
 
 
-def _compute_leader_measures(gap: float, speed: float, leader_speed: float, acceleration: float,
-                             leader_acceleration: float) -> tuple[float, ...]:
-    """Return the measures of car following, in the order of `MEASURES`."""
-    headway = time_gap(gap, speed)
-    return (gap, headway, headway, time_to_collision(gap, speed, leader_speed),
-            time_to_collision_accelerating(gap, speed, leader_speed, acceleration,
-                                           leader_acceleration),
-            deceleration_to_avoid_crash(gap, speed, leader_speed),
-            required_acceleration(gap, speed, leader_speed, leader_acceleration))
-
-
 # The measures of car following to one that is not the leader.
-WITHOUT_LEADER = _compute_leader_measures(math.nan, 0.0, 0.0, 0.0, 0.0)
+_WITHOUT_LEADER = [measure(NO_LEADER) for measure in _OF_LEADER]

@@ -4,11 +4,10 @@
 
 from typing import Any
 
+from crgame_ros.analysis.criticality.car_following_measures import NO_LEADER
 from crgame_ros.analysis.criticality.criticality import (
-    COLUMN,
     Criticality,
     MEASURES,
-    WITHOUT_LEADER,
 )
 from crgame_ros.analysis.criticality.nearby_footprints import NEAR
 from crgame_ros.analysis.runs.run import Run
@@ -37,9 +36,9 @@ def measure_column(name: str, prefix: str = '', empty: str = '') -> Column:
     :param prefix: prefix of the column's name; `worst_` for the worst moment of a run.
     :param empty: when it has no value, if that differs from when the measure is undefined.
     """
-    measure, place = MEASURES[name], COLUMN[name]
-    following = place < len(WITHOUT_LEADER)
-    never = NOT_THE_LEADER if following and np.isnan(WITHOUT_LEADER[place]) else ''
+    measure = MEASURES[name]
+    following = measure.of_leader is not None
+    never = NOT_THE_LEADER if measure.of_leader and np.isnan(measure.of_leader(NO_LEADER)) else ''
     variant = '' if np.isnan(measure.undefined) else (
         f'{measure.undefined:g} where it is not defined'
         + (f' and where {NOT_THE_LEADER}' if following and not never else ''))
