@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
+from crgame_ros.analysis.filters import low_passed, PADDING
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +20,6 @@ FloatArray = NDArray[np.float64]
 
 # Recording gaps up to this length are interpolated linearly; a longer gap begins a new piece [s].
 LONGEST_GAP_S = 0.1
-ORDER = 2
 # A shorter piece cannot show reversals of 0.6 Hz [s].
 SHORTEST_S = 2.0
 
@@ -175,17 +175,6 @@ VISUAL = ReversalSetting(0.6, 3.0)
 COGNITIVE = ReversalSetting(2.0, 0.1)
 
 
-def smoothed(angles_deg: FloatArray, dt_s: float, cutoff_hz: float) -> FloatArray:
-    """
-    Filter angles forwards and backwards by a Butterworth low pass of order 2.
-
-    :param angles_deg: (N) dt apart, N > 9 [degrees]
-    """
-    from scipy.signal import butter, filtfilt  # Takes a second.
-    numerator, denominator = butter(ORDER, cutoff_hz, fs=1.0 / dt_s)
-    return np.asarray(filtfilt(numerator, denominator, angles_deg))
-
-
 def stationary_points(angles_deg: FloatArray) -> FloatArray:
     """
     Return the angles at which the difference changes sign, or the previous one is zero.
@@ -221,11 +210,10 @@ def reversal_rate(pieces: Sequence[FloatArray], dt_s: float, setting: ReversalSe
         than `SHORTEST_S` are left out [degrees]
     :return: NaN if no piece is left, or the cut-off is beyond half the sampling rate [1/min]
     """
-    # A filter of order 2 is padded by 9 samples at either end.
-    long = [piece for piece in pieces if len(piece) * dt_s >= SHORTEST_S and len(piece) > 9]
+    long = [piece for piece in pieces
+            if len(piece) * dt_s >= SHORTEST_S and len(piece) > PADDING]
     if not long or setting.cutoff_hz >= 0.5 / dt_s:
         return math.nan
-    # A wheel that never turns has no reversals; its run then needs no filter, which takes seconds.
-    count = sum(count_reversals(stationary_points(smoothed(piece, dt_s, setting.cutoff_hz)),
-                                setting.gap_deg) for piece in long if piece.min() < piece.max())
+    count = sum(count_reversals(stationary_points(low_passed(piece, dt_s, setting.cutoff_hz)),
+                                setting.gap_deg) for piece in long)
     return 60.0 * count / (dt_s * sum(len(piece) - 1 for piece in long))

@@ -8,6 +8,7 @@ import math
 from typing import NamedTuple
 
 from commonroad.planning.planning_problem import PlanningProblem
+from crgame_ros.analysis.filters import smoothed_derivative
 from crgame_ros.analysis.scores.collisions_by_kind import (
     AHEAD,
     angle_to,
@@ -177,11 +178,10 @@ def measure_comfort(drive: ScoredDrive) -> DriveComfort | None:
 
 def _filtered(values: FloatArray, dt_s: float, samples: int, order: int) -> FloatArray:
     """Return values smoothed over a window of samples of 0.1 s, differentiated `order` times."""
-    from scipy.signal import savgol_filter  # Takes a second.
     window = max(LEAST_STEPS, round(samples * _SAMPLE_S / dt_s))
     window = min(window, len(values))
     window -= window % 2 == 0
-    return np.asarray(savgol_filter(values, window, 2, deriv=order, delta=dt_s))
+    return smoothed_derivative(values, dt_s, window, order)
 
 
 class SpeedCompliance(NamedTuple):
