@@ -54,7 +54,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def score(values: argparse.Namespace) -> int:
     """Score a run or solutions, and print the scores."""
-    import gc
     if (values.run is None) == (values.scenario is None):
         raise InputError('give a run, or --scenario with --solution', 'crgame score',
                          'see --help')
@@ -63,8 +62,6 @@ def score(values: argparse.Namespace) -> int:
     if values.scenario is not None and values.expert is not None:
         raise InputError('is for runs', '--expert', 'leave it out')
     found = _score_run(values) if values.run is not None else _score_file(values)
-    # Free the checker's reference cycles now: at exit its package warns about what is left.
-    gc.collect()
     if values.out is not None:
         _write(found, values.out)
     told = [each.as_dict() for each in found]

@@ -25,43 +25,42 @@ leader is chosen for the whole horizon; traffic lights are ignored.
 
 import logging
 import math
-import os
 from typing import ClassVar
 
-# The package imports pyplot, which costs a second with a backend that has windows.
-os.environ.setdefault('MPLBACKEND', 'Agg')
-
-from commonroad.common.util import Interval  # noqa: E402
-from commonroad.geometry.shape import Circle, Polygon, Rectangle  # noqa: E402
-from commonroad.planning.goal import GoalRegion  # noqa: E402
-from commonroad.planning.planning_problem import PlanningProblem  # noqa: E402
-from commonroad.prediction.prediction import TrajectoryPrediction  # noqa: E402
-from commonroad.scenario.lanelet import Lanelet  # noqa: E402
-from commonroad.scenario.obstacle import DynamicObstacle, ObstacleType  # noqa: E402
-from commonroad.scenario.scenario import Scenario  # noqa: E402
-from commonroad.scenario.state import CustomState, InitialState, KSState  # noqa: E402
-from commonroad.scenario.trajectory import Trajectory  # noqa: E402
-from commonroad_idm_planner.configuration.planner_config import IDMConfig  # noqa: E402
-from commonroad_idm_planner.idm_path import IDMPathFactory  # noqa: E402
-from commonroad_idm_planner.idm_planner import IDMPlanner  # noqa: E402
-from commonroad_idm_planner.idm_state import IDMState  # noqa: E402
-from commonroad_idm_planner.idm_trajectory import IDMTrajectory  # noqa: E402
-from commonroad_idm_planner.util import closest_obstacle  # noqa: E402
-from crgame_ros.geometry.shape import Shape  # noqa: E402
-from crgame_ros.messages.plan import Plan, PlanRequest  # noqa: E402
-from crgame_ros.planner.path_following import PathPosition  # noqa: E402
-from crgame_ros.planner.path_obstacles import Corridor, ObstacleProjector, prolong  # noqa: E402
-from crgame_ros.planner.path_planner import check_positive, PathPlanner  # noqa: E402
-from crgame_ros.planner.reference_path import (  # noqa: E402
+from commonroad.common.util import Interval
+from commonroad.geometry.shape import Circle, Polygon, Rectangle
+from commonroad.planning.goal import GoalRegion
+from commonroad.planning.planning_problem import PlanningProblem
+from commonroad.prediction.prediction import TrajectoryPrediction
+from commonroad.scenario.lanelet import Lanelet
+from commonroad.scenario.obstacle import DynamicObstacle, ObstacleType
+from commonroad.scenario.scenario import Scenario
+from commonroad.scenario.state import CustomState, InitialState, KSState
+from commonroad.scenario.trajectory import Trajectory
+from crgame_ros.geometry.shape import Shape
+from crgame_ros.messages.plan import Plan, PlanRequest
+from crgame_ros.planner.path_following import PathPosition
+from crgame_ros.planner.path_obstacles import Corridor, ObstacleProjector, prolong
+from crgame_ros.planner.path_planner import check_positive, PathPlanner
+from crgame_ros.planner.reference_path import (
     admissible_speeds,
     default_speed,
     desired_speeds,
-    DrivingPath,  # noqa: E402
+    DrivingPath,
 )
-from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
-from crgame_ros.vehicle.state import STANDING  # noqa: E402
-import numpy as np  # noqa: E402
-from numpy.typing import NDArray  # noqa: E402
+from crgame_ros.postponed import DRAWING, postponed
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import STANDING
+import numpy as np
+from numpy.typing import NDArray
+
+with postponed(*DRAWING):
+    from commonroad_idm_planner.configuration.planner_config import IDMConfig
+    from commonroad_idm_planner.idm_path import IDMPathFactory
+    from commonroad_idm_planner.idm_planner import IDMPlanner
+    from commonroad_idm_planner.idm_state import IDMState
+    from commonroad_idm_planner.idm_trajectory import IDMTrajectory
+    from commonroad_idm_planner.util import closest_obstacle
 
 Array = NDArray[np.float64]
 

@@ -5,33 +5,32 @@
 from copy import deepcopy
 import logging
 import math
-import os
 
-# commonroad-clcs imports pyplot, which costs a second with a backend that has windows.
-os.environ.setdefault('MPLBACKEND', 'Agg')
+from commonroad.scenario.scenario import Scenario
+from crgame_ros.errors import PlanningError
+from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.geometry.polyline import ReferencePath
+from crgame_ros.geometry.reference_point import joined, shifted
+from crgame_ros.messages.plan import PlanRequest
+from crgame_ros.planner.collision_slices import CollisionSlices
+from crgame_ros.planner.interface import PlannerContext
+from crgame_ros.planner.path_following import PathPosition
+from crgame_ros.planner.path_obstacles import Clearance
+from crgame_ros.planner.reference_path import DrivingPath
+from crgame_ros.planner.sample_kinematics import feasible, place
+from crgame_ros.postponed import DRAWING, postponed
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import REST, STATE_WIDTH
+import numpy as np
+from numpy.typing import NDArray
 
-from commonroad.scenario.scenario import Scenario  # noqa: E402
-from commonroad_clcs.config import CLCSParams  # noqa: E402
-from commonroad_rp import reactive_planner as package  # noqa: E402
-from commonroad_rp.state import ReactivePlannerState  # noqa: E402
-from commonroad_rp.trajectories import TrajectoryBundle, TrajectorySample  # noqa: E402
-from commonroad_rp.utility.config import ReactivePlannerConfiguration  # noqa: E402
-from commonroad_rp.utility.utils_coordinate_system import CoordinateSystem  # noqa: E402
-from crgame_ros.errors import PlanningError  # noqa: E402
-from crgame_ros.geometry.angles import wrap_pi  # noqa: E402
-from crgame_ros.geometry.polyline import ReferencePath  # noqa: E402
-from crgame_ros.geometry.reference_point import joined, shifted  # noqa: E402
-from crgame_ros.messages.plan import PlanRequest  # noqa: E402
-from crgame_ros.planner.collision_slices import CollisionSlices  # noqa: E402
-from crgame_ros.planner.interface import PlannerContext  # noqa: E402
-from crgame_ros.planner.path_following import PathPosition  # noqa: E402
-from crgame_ros.planner.path_obstacles import Clearance  # noqa: E402
-from crgame_ros.planner.reference_path import DrivingPath  # noqa: E402
-from crgame_ros.planner.sample_kinematics import feasible, place  # noqa: E402
-from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
-from crgame_ros.vehicle.state import REST, STATE_WIDTH  # noqa: E402
-import numpy as np  # noqa: E402
-from numpy.typing import NDArray  # noqa: E402
+with postponed(*DRAWING):
+    from commonroad_clcs.config import CLCSParams
+    from commonroad_rp import reactive_planner as package
+    from commonroad_rp.state import ReactivePlannerState
+    from commonroad_rp.trajectories import TrajectoryBundle, TrajectorySample
+    from commonroad_rp.utility.config import ReactivePlannerConfiguration
+    from commonroad_rp.utility.utils_coordinate_system import CoordinateSystem
 
 Array = NDArray[np.float64]
 

@@ -13,19 +13,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from commonroad_clcs.pycrccosy import (
-    CurvilinearProjectionDomainLateralError,
-    CurvilinearProjectionDomainLongitudinalError,
-)
-from commonroad_rp.reactive_planner import ReactivePlanner
-from commonroad_rp.trajectories import (
-    CartesianSample,
-    CurviLinearSample,
-    FeasibilityStatus,
-    TrajectorySample,
-)
+from crgame_ros.postponed import DRAWING, postponed
 import numpy as np
 from numpy.typing import NDArray
+
+with postponed(*DRAWING):
+    from commonroad_clcs.pycrccosy import (
+        CurvilinearProjectionDomainLateralError,
+        CurvilinearProjectionDomainLongitudinalError,
+    )
+    from commonroad_rp.reactive_planner import ReactivePlanner
+    from commonroad_rp.trajectories import (
+        CartesianSample,
+        CurviLinearSample,
+        FeasibilityStatus,
+        TrajectorySample,
+    )
 
 Array = NDArray[np.float64]
 

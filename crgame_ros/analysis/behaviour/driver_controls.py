@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
-from crgame_ros.analysis.filters import low_passed, PADDING
+from crgame_ros.filters import low_passed, PADDING
 import numpy as np
 from numpy.typing import NDArray
 

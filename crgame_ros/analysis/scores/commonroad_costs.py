@@ -17,7 +17,7 @@ from commonroad.scenario.trajectory import Trajectory
 from crgame_ros.errors import one_line
 
 if TYPE_CHECKING:
-    from commonroad_dc.costs.evaluation import CostFunctionEvaluator, LaneletRouteMatcher
+    from crgame_ros.analysis.scores.checker import CostFunctionEvaluator, LaneletRouteMatcher
 
 _PATH_LENGTH = 'the code takes the path length L where the site has the offset from the lane'
 
@@ -85,7 +85,7 @@ def evaluate_costs(scenario: Scenario, problem: PlanningProblem, trajectory: Tra
     :param trajectory: states of the centre, as in CommonRoad's vehicle models.
     :param kind: vehicle type, which gives the width.
     """
-    from commonroad_dc.costs.evaluation import (  # Takes seconds.
+    from crgame_ros.analysis.scores.checker import (
         CostFunctionEvaluator,
         LaneletRouteMatcher,
     )
@@ -121,7 +121,7 @@ def _evaluate(scenario: Scenario, problem: PlanningProblem, trajectory: Trajecto
               evaluator: 'CostFunctionEvaluator', along_lanes: _AlongLanes | None,
               ) -> TrajectoryCost:
     """Evaluate a function, as the checker's `evaluate_pp_solution` does."""
-    from commonroad_dc.costs.evaluation import PartialCostFunctionMapping
+    from crgame_ros.analysis.scores.checker import PartialCostFunctionMapping
     name = evaluator.cost_function_id.name
     try:
         if along_lanes is None:

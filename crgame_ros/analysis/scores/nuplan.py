@@ -8,7 +8,6 @@ import math
 from typing import NamedTuple
 
 from commonroad.planning.planning_problem import PlanningProblem
-from crgame_ros.analysis.filters import smoothed_derivative
 from crgame_ros.analysis.scores.collisions_by_kind import (
     AHEAD,
     angle_to,
@@ -26,6 +25,7 @@ from crgame_ros.analysis.scores.route_progress import (
 )
 from crgame_ros.analysis.scores.scored_drive import ScoredDrive, Track, TrackKind
 from crgame_ros.errors import InputError
+from crgame_ros.filters import smoothed_derivative
 from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.roads.boundary import RoadBoundary
 from crgame_ros.roads.network import RoadNetwork

@@ -111,7 +111,7 @@ def _part(scored: ScoredScenario, found: PlanningProblemSolution, name: str) -> 
 
 def _failures(scored: ScoredScenario, solution: Solution) -> dict[str, str]:
     """Run the checks that concern a solution as a whole; return failures by name."""
-    from commonroad_dc.feasibility import solution_checker
+    from crgame_ros.analysis.scores.checker import solution_checker
     problems = PlanningProblemSet(list(scored.loaded.planning_problems))
     failed = {}
     for name, check in (

@@ -64,7 +64,7 @@ def _check_solution(scenario: Scenario, problem: PlanningProblem,
     :param boundary: boundary of the road.
     :param earlier: failures of checks of the whole solution, by name.
     """
-    from commonroad_dc.feasibility import solution_checker
+    from crgame_ros.analysis.scores.checker import solution_checker
     problems = PlanningProblemSet([problem])
     solution = Solution(scenario.scenario_id, [found])
     checks: dict[str, Callable[[], object]] = {
@@ -90,7 +90,7 @@ def _check_solution(scenario: Scenario, problem: PlanningProblem,
 
 
 def _shape(found: PlanningProblemSolution) -> Shape:
-    from commonroad_dc.feasibility import solution_checker
+    from crgame_ros.analysis.scores.checker import solution_checker
     known = solution_checker.VehicleParameterMapping.from_vehicle_type(found.vehicle_type)
     return Shape.rectangle(float(known.l), float(known.w))
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # Importing the checker takes a second.
-    from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
+    from crgame_ros.analysis.scores.checker import VehicleDynamics
 
 FloatArray = NDArray[np.float64]
 
@@ -112,7 +112,7 @@ def check_feasibility(found: PlanningProblemSolution, problem: PlanningProblem, 
 
 
 def _dynamics(found: PlanningProblemSolution) -> 'VehicleDynamics':
-    from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
+    from crgame_ros.analysis.scores.checker import VehicleDynamics
     return VehicleDynamics.from_model(found.vehicle_model, found.vehicle_type)
 
 
@@ -124,7 +124,7 @@ def _transition(now: TraceState, then: TraceState, dynamics: 'VehicleDynamics', 
                 ) -> tuple[bool, tuple[float, float, float, float, float]]:
     """Check one transition; return the verdict, both errors and the excess over three limits."""
     start, end = dynamics.state_to_array(now)[0], dynamics.state_to_array(then)[0]
-    from commonroad_dc.feasibility import feasibility_checker
+    from crgame_ros.analysis.scores.checker import feasibility_checker
     made, feasible = _apparently_made(start, end, dynamics, step_s), True
     if made is None:
         feasible, inputs = feasibility_checker.state_transition_feasibility(
@@ -185,7 +185,7 @@ def _why(position: float, heading: float, acceleration: float, rate: float,
 def _check_inputs(found: PlanningProblemSolution, problem: PlanningProblem,
                   dynamics: 'VehicleDynamics', dt_s: float) -> TrajectoryFeasibility:
     """Check a solution that holds inputs: each input must be within bounds and friction."""
-    from commonroad_dc.feasibility import feasibility_checker
+    from crgame_ros.analysis.scores.checker import feasibility_checker
     try:
         feasible, made = feasibility_checker.input_vector_feasibility(
             problem.initial_state, found.trajectory, dynamics, dt_s)
@@ -208,7 +208,7 @@ def simulated(found: PlanningProblemSolution, problem: PlanningProblem,
     if found.trajectory_type not in (TrajectoryType.Input, TrajectoryType.PMInput):
         return found.trajectory
     dynamics = _dynamics(found)
-    from commonroad_dc.feasibility import feasibility_checker
+    from crgame_ros.analysis.scores.checker import feasibility_checker
     try:
         return feasibility_checker.input_vector_feasibility(
             problem.initial_state, found.trajectory, dynamics, dt_s)[1]

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The filters give what scipy.signal gives."""
 
-from crgame_ros.analysis.filters import low_passed, PADDING, smoothed_derivative
+from crgame_ros.filters import low_passed, PADDING, smoothed_derivative
 import numpy as np
 import pytest
 from scipy.signal import butter, filtfilt, savgol_filter

@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Imports by packages that are postponed until a function of them is called."""
+
+from pathlib import Path
+import subprocess
+import sys
+
+from crgame_ros.postponed import postponed
+import pytest
+
+USER = 'from colorsys import rgb_to_hsv\nimport colorsys as drawing\n'
+
+
+def test_what_is_called_is_loaded_then(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / 'user_of_colorsys.py').write_text(USER)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, 'colorsys', raising=False)
+    with postponed('colorsys'):
+        import user_of_colorsys as user  # type: ignore[import-not-found]
+    assert 'colorsys' not in sys.modules
+    with pytest.raises(AttributeError, match='__file__'):
+        _ = user.drawing.__file__
+    assert user.rgb_to_hsv(1.0, 0.0, 0.0) == user.drawing.rgb_to_hsv(1.0, 0.0, 0.0) == (0, 1, 1)
+    assert 'colorsys' in sys.modules
+    with pytest.raises(AttributeError, match='paint'):
+        user.drawing.paint()
+
+
+def test_what_is_there_already_stays() -> None:
+    with postponed('pathlib'):
+        assert sys.modules['pathlib'].Path is Path
+    assert sys.modules['pathlib'].Path is Path
+
+
+@pytest.mark.parametrize('module', [
+    'analysis.scores.checker', 'planner.idm_package', 'planner.reactive'])
+def test_nothing_is_loaded_that_only_draws(module: str) -> None:
+    code = f'import crgame_ros.{module}, sys; print(*sys.modules)'
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert not {'matplotlib.pyplot', 'matplotlib.axes'} & {*done.stdout.split()}
