@@ -17,7 +17,7 @@ def test_what_is_called_is_loaded_then(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, 'colorsys', raising=False)
     with postponed('colorsys'):
-        import user_of_colorsys as user  # type: ignore[import-not-found]
+        import user_of_colorsys as user
     assert 'colorsys' not in sys.modules
     with pytest.raises(AttributeError, match='__file__'):
         _ = user.drawing.__file__

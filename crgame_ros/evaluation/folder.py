@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from crgame_ros.analysis.tables.column import TableDeclaration
-from crgame_ros.analysis.tables.data_package import PACKAGE_FILE, PROFILE, table_schema
+from crgame_ros.analysis.tables.data_package import PROFILE, table_schema
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_grid import CellGrid
@@ -16,6 +16,7 @@ from crgame_ros.evaluation.file_names import FILES, GRID_FILE
 from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
 from crgame_ros.recording.export import prepare_folder
+from crgame_ros.recording.run_folder import PACKAGE_FILE
 from crgame_ros.schema.writing import write
 from crgame_ros.version import __version__
 from crgame_ros.whole_file import write_text

@@ -16,6 +16,8 @@ _LATER = re.compile(r'run_([1-9][0-9]*)')
 _BAG = re.compile(r'bag(_[0-9]+|_part[0-9]+)*')
 # In the folder of a study: its file, and the folder with those of its participants.
 STUDY_FILE, PARTICIPANTS = Path('study', 'study.yaml'), 'participants'
+# Describes the tables of a folder.
+PACKAGE_FILE = 'datapackage.json'
 
 
 def run_folder(session: Path, epoch: int) -> Path:

@@ -10,7 +10,6 @@ from pathlib import Path
 import re
 from typing import Any
 
-from crgame_ros.analysis.tables.data_package import PACKAGE_FILE
 from crgame_ros.errors import CrgameError, InputError, one_line
 from crgame_ros.game.game import Game
 from crgame_ros.recording.epochs import epoch_numbers
@@ -20,6 +19,7 @@ from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import (
     bags_of,
+    PACKAGE_FILE,
     PARTICIPANTS,
     recording_in,
     run_folders,
@@ -233,11 +233,12 @@ def _yaml(path: Path, _progress: Progress | None) -> FileVerdict:
     faults = [str(error) for error in wrong]
     remarks: tuple[str, ...] = ()
     if file_kind.declared is Game and not faults:
-        from crgame_ros.evaluation.judging import check_expectations
         from crgame_ros.game.game import parse_game
         try:
             game = parse_game(values, str(path), path.parent)
-            check_expectations(game, str(path))
+            if game.expect:
+                from crgame_ros.evaluation.judging import check_expectations
+                check_expectations(game, str(path))
             remarks = build_setup(game).notices
             if game.vary:
                 space_of(write(game, game.base), str(path)).check(game.base, str(path))

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 from crgame_ros.analysis.tables.column import Column, FLAG, TableDeclaration
 from crgame_ros.analysis.tables.writer import Format, FORMULA_GUARD, NOT_A_NUMBER
 from crgame_ros.errors import InputError
+from crgame_ros.recording.run_folder import PACKAGE_FILE
 from crgame_ros.version import __version__
 from crgame_ros.yaml_text import read_text
 import pyarrow as pa
 from pyarrow import csv, parquet
 import pyarrow.compute as pc
 
-PACKAGE_FILE = 'datapackage.json'
 CREATOR = 'crgame_ros'
 # https://datapackage.org/standard/data-package/, version 2
 PROFILE = 'https://datapackage.org/profiles/2.0/{}.json'

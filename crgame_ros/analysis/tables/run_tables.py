@@ -11,12 +11,7 @@ from typing import Any, Self
 from crgame_ros.analysis.runs.run import Run, RunProgress, Scoring
 from crgame_ros.analysis.tables.behaviour import BEHAVIOUR_TABLES, write_behaviour
 from crgame_ros.analysis.tables.column import part_rows, TableDeclaration
-from crgame_ros.analysis.tables.data_package import (
-    CREATOR,
-    data_package,
-    PACKAGE_FILE,
-    WrittenTable,
-)
+from crgame_ros.analysis.tables.data_package import CREATOR, data_package, WrittenTable
 from crgame_ros.analysis.tables.instruments import (
     GAZE_TABLES,
     INSTRUMENT_TABLES,
@@ -38,7 +33,7 @@ from crgame_ros.analysis.tables.writer import (
 )
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import prepare_folder
-from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_folder import PACKAGE_FILE, recording_in
 from crgame_ros.whole_file import part_of, write_text
 import pyarrow as pa
 

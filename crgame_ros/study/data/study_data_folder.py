@@ -9,16 +9,12 @@ import json
 from pathlib import Path
 
 from crgame_ros.analysis.tables.column import Column, INTEGER, TableDeclaration, TEXT
-from crgame_ros.analysis.tables.data_package import (
-    data_package,
-    PACKAGE_FILE,
-    table_schema,
-    WrittenTable,
-)
+from crgame_ros.analysis.tables.data_package import data_package, table_schema, WrittenTable
 from crgame_ros.analysis.tables.run_tables import TABLES
 from crgame_ros.analysis.tables.writer import Format, NOT_A_NUMBER, TableWriter
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import prepare_folder
+from crgame_ros.recording.run_folder import PACKAGE_FILE
 from crgame_ros.study.analysis.r_script import r_script
 from crgame_ros.study.data.paper_section import provenance_of
 from crgame_ros.study.data.study_data import CountedTrial, one_per_run, StudyData

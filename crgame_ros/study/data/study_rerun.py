@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDeclaration, TEXT
-from crgame_ros.analysis.tables.data_package import data_package, PACKAGE_FILE, WrittenTable
+from crgame_ros.analysis.tables.data_package import data_package, WrittenTable
 from crgame_ros.analysis.tables.vehicles import VEHICLES
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.evaluation.cell_scene import before_take_over
 from crgame_ros.recording.export import prepare_folder
 from crgame_ros.recording.run_cycles import replay_inputs
-from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_folder import PACKAGE_FILE, recording_in
 from crgame_ros.simulation.av_assignment import OWN
 from crgame_ros.study.data.study_data import CountedTrial, one_per_run, StudyData
 from crgame_ros.study.data.study_row_table import csv_of_table, table_of_rows, with_unit

@@ -14,10 +14,9 @@ from pathlib import Path
 import shutil
 
 from crgame_ros.analysis.report.command import REPORT_FILE
-from crgame_ros.analysis.tables.data_package import PACKAGE_FILE
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.evaluation.file_names import GRID_FILE
-from crgame_ros.recording.run_folder import PARTICIPANTS, STUDY_FILE
+from crgame_ros.recording.run_folder import PACKAGE_FILE, PARTICIPANTS, STUDY_FILE
 from crgame_ros.study.data.conducted_study import ConductedStudy, DATA
 from crgame_ros.study.data.preregistration import PREREGISTRATION
 from crgame_ros.study.data.study_data import KEPT, read_study_data, TABLE_NAMES
