@@ -59,9 +59,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
             recorder.terminate()
             assert recorder.wait(PATIENCE_S) == 0
         finally:
-            for process in (script, recorder):
-                if process is not None and process.poll() is None:
-                    process.kill()
+            # The script's nodes are in its group; they outlive it if it is killed alone.
+            if script.poll() is None:
+                os.killpg(script.pid, signal.SIGKILL)
+            if recorder is not None and recorder.poll() is None:
+                recorder.kill()
         yield folder
 
 
