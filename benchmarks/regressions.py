@@ -37,7 +37,9 @@ ROOT = Path(__file__).resolve().parents[1]
 Work = Callable[[], float]
 # Before an answer of a process.
 TOLD = 'told: '
-COMMANDS = ('info', 'validate', 'measure', 'score', 'export', 'report')
+# With where they write, in a folder of their own.
+COMMANDS = {'info': (), 'validate': (), 'measure': (), 'score': (), 'export': (),
+            'report': ('--out', 'report.html'), 'figures': ('--out', 'figures')}
 # Kinds of the offline runner, as `benchmarks/offline.py` names them.
 OFFLINE = ('start of a cell, warm', 'cut-in game, 20 s, idm',
            'the same with drivability at 100 Hz', 'the same with criticality too',
@@ -57,10 +59,8 @@ def children_s(*command: str) -> float:
 
 def command(name: str, recording: Path) -> Work:
     """Return the work of a command with the recording."""
-    given = [str(recording / 'game.yaml' if name == 'validate' else recording)]
-    if name == 'report':
-        given += ['--out', 'report']
-    return lambda: children_s('crgame_ros.cli', name, *given)
+    given = recording / 'game.yaml' if name == 'validate' else recording
+    return lambda: children_s('crgame_ros.cli', name, str(given), *COMMANDS[name])
 
 
 def offline(name: str) -> Work:
