@@ -344,14 +344,15 @@ def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meeting
     result = joined = math.inf
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
         other = meeting.other[n]
-        if meeting.behind[n] < joined and _goes_first(k, agents, passage, meeting, at, i, n):
-            joined = meeting.behind[n]
-        if meeting.apart[n] or meeting.into[n] >= result:
-            continue
+        joins = meeting.behind[n] < joined
         # An agent that cannot stop before the conflict any more drives on.
-        if agents.speed[slot]**2 > 8.0 * max(meeting.into[n], 0.1):
+        halts = not meeting.apart[n] and meeting.into[n] < result and (
+            agents.speed[slot]**2 <= 8.0 * max(meeting.into[n], 0.1))
+        if not ((joins or halts) and _goes_first(k, agents, passage, meeting, at, i, n)):
             continue
-        if _goes_first(k, agents, passage, meeting, at, i, n):
+        if joins:
+            joined = meeting.behind[n]
+        if halts:
             result = meeting.into[n]
             agents.blocker[slot] = at.slots[other] if other >= 0 else other
     # The room before the conflict gets smaller rather than that the agent brakes hard for it.
