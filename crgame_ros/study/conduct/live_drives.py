@@ -275,7 +275,7 @@ class LiveDrives:
             else:
                 if hold:
                     rider.session.hold(True)
-                rider.session.finish(**own)
+                rider.session.finish(None, **own)
 
     async def _break_off(self, item: SessionItem, reason: str | None) -> None:
         """End a run that does not count: it was aborted, or its item was skipped."""
