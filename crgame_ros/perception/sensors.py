@@ -168,8 +168,7 @@ def create_sensor(spec: SensorSpec, where: str = '') -> Sensor:
     :param where: the file and key that named it, for messages
     :raises InputError: if there is no sensor of that name, or it refuses its options.
     """
-    made: Sensor = SENSORS.create(spec.model, spec.options, where, spec=spec)
-    return made
+    return SENSORS.create(spec.model, spec.options, where, spec=spec)
 
 
 class Detections(NamedTuple):

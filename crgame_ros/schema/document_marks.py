@@ -5,10 +5,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 import math
-from typing import Any, get_args
+from typing import Any, get_args, TYPE_CHECKING
 
+from crgame_ros.schema.marks import Handler
 from crgame_ros.schema.reading import read
 from crgame_ros.schema.writing import write
+
+if TYPE_CHECKING:
+    from pydantic import ValidationInfo
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,7 @@ class Bounded:
 
     most: int
 
-    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> object:
+    def __get_pydantic_core_schema__(self, source: object, handler: Handler) -> object:
         """Return the schema of the marked type, for pydantic."""
         schema = handler(source)
         if schema['type'] in ('list', 'tuple'):
@@ -41,7 +45,7 @@ class Bounded:
 class Exact:
     """A mark for the type of a value that must have it: no text is a number, no flag either."""
 
-    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> object:
+    def __get_pydantic_core_schema__(self, source: object, handler: Handler) -> object:
         """Return the schema of the marked type, for pydantic."""
         return handler(source) | {'strict': True}
 
@@ -52,7 +56,7 @@ class Otherwise:
 
     known: str
 
-    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> Any:
+    def __get_pydantic_core_schema__(self, source: object, handler: Handler) -> object:
         """Return the schema of the marked type, for pydantic."""
         return {'type': 'function-before', 'schema': handler(source), 'function': {
             'type': 'no-info', 'function': lambda given:
@@ -65,9 +69,9 @@ class Derived:
 
     names: tuple[str, ...]
 
-    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> object:
+    def __get_pydantic_core_schema__(self, source: object, handler: Handler) -> object:
         """Return the schema of the marked class, for pydantic."""
-        def write_all(value: object, write_fields: Any) -> object:
+        def write_all(value: object, write_fields: Handler) -> object:
             return write_fields(value) | {name: getattr(value, name) for name in self.names}
         return handler(source) | {
             'serialization': {'type': 'function-wrap', 'function': write_all}}
@@ -76,7 +80,8 @@ class Derived:
 class Row:
     """A mark for a class that is written as the list of its finite numbers."""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> object:
+    def __get_pydantic_core_schema__(self, source: Callable[..., object],
+                                     handler: object) -> object:
         """Return the schema of the marked class, for pydantic."""
         names = tuple(source.__annotations__)
 
@@ -119,8 +124,8 @@ class Declared:
         return write(value)
 
 
-def _plain_schema(read_value: Callable[[object, Any], object],
-                  write_value: Callable[[Any], object]) -> object:
+def _plain_schema(read_value: 'Callable[[object, ValidationInfo], object]',
+                  write_value: Callable[[object], object]) -> object:
     """Return the schema of a value that two functions read and write."""
     return {'type': 'function-plain', 'function': {'type': 'with-info', 'function': read_value},
             'serialization': {'type': 'function-plain', 'function': write_value}}
