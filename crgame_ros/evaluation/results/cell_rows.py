@@ -3,7 +3,6 @@
 """The rows of a cell in the tables, and the tables' declarations."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from crgame_ros.analysis.blame.blame import blame_of, KINDS
 from crgame_ros.analysis.runs.run import Run
@@ -95,11 +94,11 @@ def vehicle_rows(run: Run, result: OfflineResult,
 
     :param contacts: of the run.
     """
-    columns: dict[str, Sequence[Any]] = part_rows(VEHICLE_PARTS, run)
+    columns: dict[str, Sequence[object]] = part_rows(VEHICLE_PARTS, run)
     ids = columns.pop('id')
     del columns['run']
     rows = []
-    for place, vehicle in enumerate(ids):
+    for place, vehicle in enumerate(map(str, ids)):
         verdicts = [item for item in result.violations if item.vehicle_id == vehicle]
         record = result.planners.get(vehicle)
         collided = any(item.collision for item in verdicts)
