@@ -38,8 +38,7 @@ _WIDTH = 99
 def registry_of(kind: str) -> 'ModelRegistry[object]':
     """Return the registry of a kind of model."""
     module, name = REGISTRIES[kind]
-    found: ModelRegistry[object] = getattr(importlib.import_module(module), name)
-    return found
+    return getattr(importlib.import_module(module), name)
 
 
 def purpose_of(kind: type[object]) -> str:

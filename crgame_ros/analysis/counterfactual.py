@@ -62,8 +62,7 @@ class Alternative:
     @property
     def contacts(self) -> Sequence[Mapping[str, Any]] | None:
         """Return the first contact of each pair as in `timing.json`; None if unknown."""
-        found: Sequence[Mapping[str, Any]] | None = self.outcome['contacts']
-        return found
+        return self.outcome['contacts']
 
     @property
     def state_hash(self) -> str | None:

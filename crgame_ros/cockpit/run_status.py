@@ -249,8 +249,7 @@ class RunStatus:
 
     def _hit(self, vehicle: str) -> Sequence[str]:
         """Return the objects that the last verdict on a vehicle names."""
-        hit: Sequence[str] = self.drivability.get(vehicle, {}).get('hit', ())
-        return hit
+        return self.drivability.get(vehicle, {}).get('hit', ())
 
     def _was_stopped(self, vehicle: str, other: str, t: float) -> bool:
         """Return whether one of two vehicles has just been stopped by a contact with the other."""

@@ -249,8 +249,7 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
         'contact': game.drivability.contact,
         'tasks': [_task(task, game.tasks) for task in game.tasks], 'language': game.language,
         'gaze': list(game.gaze_seats)}
-    finite: Document = _finite(document)
-    return finite
+    return _finite(document)
 
 
 def _task(spec: TaskSpec, tasks: Sequence[TaskSpec]) -> Document:

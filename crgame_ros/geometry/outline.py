@@ -145,8 +145,7 @@ def _triangulate(shape: Shape) -> list[list[float]]:
     if polygon.area == 0.0:
         raise InputError(f'a polygon of {len(shape.vertices)} corners has no area', 'shape',
                          'give at least three corners that are not in one line')
-    corners: list[list[float]] = triangle_corners(polygon).reshape(-1, 6).tolist()
-    return corners
+    return triangle_corners(polygon).reshape(-1, 6).tolist()
 
 
 def touches(rectangle: Shape, poses: FloatArray, other: Shape,

@@ -50,8 +50,7 @@ class KeyedNoise:
     def normal(self, n: int) -> Array:
         """Return the standard normal numbers (width) of step n."""
         row = self._row(n)
-        numbers: Array = self._normal[row]
-        return numbers
+        return self._normal[row]
 
     def uniform(self, n: int) -> float:
         """Return the number of step n that is uniform in [0, 1)."""

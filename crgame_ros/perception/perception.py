@@ -70,8 +70,7 @@ class Tracks:
 
     def known(self, n: int) -> NDArray[np.bool_]:
         """Return which things (T) are seen or remembered at step n."""
-        found: NDArray[np.bool_] = n < self._until_n
-        return found
+        return n < self._until_n
 
     def predict(self, things: Index, n: int, times_s: Array) -> tuple[Array, Array]:
         """

@@ -110,8 +110,7 @@ def mark_of(marks: tuple[object, ...], kind: type[T]) -> T | None:
 
 def form_of(kind: type[object]) -> Form:
     """Return the form of a dataclass in a file."""
-    form: Form = getattr(kind, 'FORM', _PLAIN)
-    return form
+    return getattr(kind, 'FORM', _PLAIN)
 
 
 _PLAIN = Form()

@@ -200,8 +200,7 @@ class FileKind(NamedTuple):
     @property
     def declared(self) -> type[object]:
         """Return the class that declares it."""
-        kind: type[object] = getattr(importlib.import_module(self.module), self.name)
-        return kind
+        return getattr(importlib.import_module(self.module), self.name)
 
     def schema(self) -> Schema:
         """Return its JSON Schema."""

@@ -224,8 +224,7 @@ class VariantSpace:
         for path, source, place in self._set:
             value = source.value(variant) if isinstance(source, Expression) else variant[source]
             values = with_value(values, path, value, place)
-        made: dict[str, object] = values
-        return made
+        return values
 
     def check(self, base: Any, where: str) -> None:
         """
@@ -284,8 +283,7 @@ def _value_at(values: Any, path: str) -> object:
             values = None if place is None else values[place]
         else:
             return None
-    found: object = values
-    return found
+    return values
 
 
 def with_value(values: Any, path: str, value: object, where: str = '') -> Any:
@@ -405,6 +403,5 @@ def _points(sampling: Sampling, dimensions: int, seed: int) -> Callable[[int], P
     engine = {'sobol': qmc.Sobol, 'lhs': qmc.LatinHypercube}[sampling](dimensions, rng=seed)
 
     def draw(number: int) -> Points:
-        points: Points = engine.random(number)
-        return points
+        return engine.random(number)
     return draw

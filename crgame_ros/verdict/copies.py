@@ -71,8 +71,7 @@ class Placement(NamedTuple):
 
     def point(self, x: float, y: float) -> list[float]:
         """Return where a point of the map comes to lie."""
-        placed: list[float] = (self.turned @ (x, y) + self.offset).tolist()
-        return placed
+        return (self.turned @ (x, y) + self.offset).tolist()
 
     def yaw(self, yaw: float) -> float:
         """Return where a direction of the map comes to point."""
@@ -111,8 +110,7 @@ def _values(game: Game, place: Placement, where: str) -> dict[str, Any]:
                               for human in game.humans):
         raise InputError('its driver cannot be mirrored', where, 'test it as it is')
     # Expressions of what varies are not placed anew.
-    values: dict[str, Any] = write(replace(game, vary=()), game.base)
-    return values
+    return write(replace(game, vary=()), game.base)
 
 
 def placed(values: Any, place: Placement) -> Any:

@@ -371,8 +371,7 @@ def _write_filtered(source: Path, name: str, keys: set[str], inside: bool,
 
 
 def _column(path: Path, name: str) -> list[str]:
-    values: list[str] = _read(path, [name])[name].to_pylist()
-    return values
+    return _read(path, [name])[name].to_pylist()
 
 
 def _read(path: Path, columns: list[str] | None = None) -> pa.Table:

@@ -154,9 +154,7 @@ class SceneMarkers:
 def _speeds(objects: ObjectStates) -> FloatArray:
     """Return signed speeds (M) [m/s]; NaN, which is never braking, where absent."""
     yaw = objects.poses[:, 2]
-    speeds: FloatArray = (objects.velocities[:, 0] * np.cos(yaw)
-                          + objects.velocities[:, 1] * np.sin(yaw))
-    return speeds
+    return objects.velocities[:, 0] * np.cos(yaw) + objects.velocities[:, 1] * np.sin(yaw)
 
 
 class AvPaths:

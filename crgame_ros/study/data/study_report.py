@@ -180,8 +180,7 @@ def _measured(value: float | None, factor: float, digits: int) -> str:
 
 
 def _rows(data: StudyData, name: str) -> list[dict[str, Any]]:
-    rows: list[dict[str, object]] = data.tables[name].to_pylist()
-    return rows
+    return data.tables[name].to_pylist()
 
 
 def participant_flow(data: StudyData) -> list[tuple[str, dict[str, int]]]:
