@@ -17,6 +17,7 @@ from crgame_ros.library.lookup import find_scenario
 if TYPE_CHECKING:  # A command that needs no engine starts without it.
     from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
     from crgame_ros.analysis.scores.vehicle import PlannerScores
+    from crgame_ros.recording.progress import Progress
 
 DESCRIPTION = """\
 Score the drivers of a run: CommonRoad's costs and checks, feasibility, nuPlan's closed-loop score,
@@ -77,7 +78,7 @@ def score(values: argparse.Namespace) -> int:
     return 0
 
 
-def _progress(what: str) -> Any:
+def _progress(what: str) -> 'Progress':
     from crgame_ros.recording.progress import Progress
     return Progress(partial(print, file=sys.stderr, flush=True), what)
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.cockpit.job_process import serve_jobs
 from crgame_ros.cockpit.scene import scene_document
@@ -164,7 +163,7 @@ def _refuse_strangers(chosen: Mapping[str, object],
                          'load the page again')
 
 
-def _without_nan(rows: list[list[Any]]) -> list[list[float | None]]:
+def _without_nan(rows: list[list[float | None]]) -> list[list[float | None]]:
     return [[None if value is None or math.isnan(value) else value for value in row]
             for row in rows]
 

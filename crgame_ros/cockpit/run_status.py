@@ -160,7 +160,7 @@ class RunStatus:
             self.run, self.reason = 'ended', 'silence'
             self._calm()
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, object]:
         """Return the part of the status document about the run's health."""
         over = self.run == 'ended'
         return {'run': self.run, 'reason': self.reason, 'stays': self.stays,

@@ -249,7 +249,7 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
         'contact': game.drivability.contact,
         'tasks': [_task(task, game.tasks) for task in game.tasks], 'language': game.language,
         'gaze': list(game.gaze_seats)}
-    return _finite(document)
+    return {name: _finite(value) for name, value in document.items()}
 
 
 def _task(spec: TaskSpec, tasks: Sequence[TaskSpec]) -> Document:
@@ -327,7 +327,7 @@ def _bounds(network: LaneletNetwork, game: GameDocument) -> list[float]:
     return flat(np.array([together.min(axis=0), together.max(axis=0)]))
 
 
-def _finite(value: object) -> Any:
+def _finite(value: object) -> object:
     """Replace NaN and infinities, which JSON does not have, by null."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None

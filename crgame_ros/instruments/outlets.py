@@ -16,13 +16,16 @@ import os
 from pathlib import Path
 import platform
 import socket
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.instruments_spec import InstrumentsSpec
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from crgame_ros.vehicle.state import StateColumn
 from crgame_ros.version import __version__
+
+if TYPE_CHECKING:
+    from pylsl import StreamInfo
 
 # Begins the ids of streams of this package.
 OWN = 'crgame_ros/'
@@ -173,7 +176,7 @@ class Outlet:
             pylsl.IRREGULAR_RATE, pylsl.cf_string if stream.texts else pylsl.cf_double64,
             self.source_id)
         _describe(info, stream)
-        self._outlet: Any = on_loopback(lambda: pylsl.StreamOutlet(info)) if local \
+        self._outlet = on_loopback(lambda: pylsl.StreamOutlet(info)) if local \
             else pylsl.StreamOutlet(info)
 
     def push(self, values: Sequence[float] | Sequence[str], steady_s: float) -> None:
@@ -181,7 +184,7 @@ class Outlet:
         self._outlet.push_sample(values, steady_s)
 
 
-def _describe(info: Any, stream: StreamDescription) -> None:
+def _describe(info: 'StreamInfo', stream: StreamDescription) -> None:
     """Describe the channels as XDF has it (https://github.com/sccn/xdf/wiki/Meta-Data)."""
     channels = info.desc().append_child('channels')
     for channel in stream.channels:

@@ -146,9 +146,9 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
             collected.add(message, reader)
         contacts, unknown = _contacts(reader, run, collected.verdicts, collected.fired)
         planners = {av: collected.planner(av) for av in collected.avs}
-        summary = metrics.summary().as_dict()
+        summary = metrics.summary()
         return {
-            **summary,
+            **summary.as_dict(),
             'late_steps': late.as_dict(),
             # The first row belongs to the step to n = 1.
             'gaps': int(numbers[-1]) - len(numbers),
@@ -167,7 +167,7 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
                 *(f'/{av}/plan: {each.of_others} plans of other programs than its planner, '
                   'which were not taken' for av, each in planners.items() if each.of_others),
                 *unknown, *([_VIRTUAL] if reader.has_virtual_clock else []),
-                *filter(None, [slowness(summary['real_time_ratio']['final'])])))]}
+                *filter(None, [slowness(summary.real_time_ratio.final)])))]}
 
 
 def write_timing_report(bag: Path, path: Path, epoch: int | None = None,

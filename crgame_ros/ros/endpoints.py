@@ -26,6 +26,7 @@ from rclpy.subscription import Subscription
 
 if TYPE_CHECKING:
     from rclpy.action import ActionServer
+    from rclpy.action.server import ServerGoalHandle
 
 PERIOD_S = 1.0
 # Unusable messages, and those for other nodes, are skipped: at most this many per read.
@@ -218,8 +219,9 @@ class Endpoints:
             message_type(row.type_name), relative(name.replace('<av>', vehicle_id)), callback,
             qos_profile=QoSProfile(depth=SERVICE_DEPTH), callback_group=group)
 
-    def action(self, name: str, execute: Callable[[Any], object],
-               cancel: Callable[[Any], bool], group: CallbackGroup) -> 'ActionServer':
+    def action(self, name: str, execute: 'Callable[[ServerGoalHandle], object]',
+               cancel: 'Callable[[ServerGoalHandle], bool]',
+               group: CallbackGroup) -> 'ActionServer':
         """
         Create an action, of which the owner must keep what is returned.
 
@@ -342,7 +344,7 @@ def _take_sent(subscription: Subscription) -> SentMessage | None:
 
 
 @cache
-def _rcl() -> tuple[Any, _Bytes]:
+def _rcl() -> tuple[ctypes.CDLL, _Bytes]:
     """Return the library that rclpy has loaded, and a buffer that it fills and enlarges."""
     tools = ctypes.CDLL('librcutils.so')
     tools.rcutils_get_default_allocator.restype = _Allocator

@@ -102,7 +102,7 @@ def write_copy(game: Path, place: Placement, folder: Path) -> Path:
     return path
 
 
-def _values(game: Game, place: Placement, where: str) -> dict[str, Any]:
+def _values(game: Game, place: Placement, where: str) -> dict[str, object]:
     """Return the values of a game without relative file names."""
     if game.occupancy is not None and place.added == 0:
         raise InputError('its map of obstacles cannot be placed anew', where, 'test it as it is')
@@ -119,7 +119,7 @@ def placed(values: Any, place: Placement) -> Any:
         return [placed(each, place) for each in values]
     if not isinstance(values, dict):
         return values
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
     for key, value in values.items():
         if key == 'at' and isinstance(value, list):
             found[key] = [*place.point(*value[:2]), *map(place.yaw, value[2:])]
@@ -153,7 +153,7 @@ def _mounted(sensor: dict[str, Any], place: Placement) -> dict[str, Any]:
     return {key: side * value if key in ('y', 'yaw') else value for key, value in sensor.items()}
 
 
-def _renamed(value: Any, place: Placement) -> Any:
+def _renamed(value: object, place: Placement) -> object:
     """Return ids of objects, of which o30 is the scenario's obstacle 30."""
     if isinstance(value, list):
         return [_renamed(each, place) for each in value]

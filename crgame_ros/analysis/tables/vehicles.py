@@ -4,7 +4,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.analysis.criticality.criticality import EXPOSURES, MEASURES
 from crgame_ros.analysis.criticality.headways import LEAST_SPEED, SHORT_S
@@ -172,7 +172,7 @@ def _following(run: Run) -> Mapping[str, Sequence[object]]:
     found = [run.vehicle_criticality.get(item.id) for item in run.log.vehicles]
     columns: dict[str, list[object]] = {column.name: [] for column in FOLLOWING_COLUMNS}
     for each in found:
-        row: dict[str, Any] = dict.fromkeys(columns)
+        row: dict[str, float | None] = dict.fromkeys(columns)
         if each is not None:
             headways = each.headways
             row['share_following'] = headways.share_following()

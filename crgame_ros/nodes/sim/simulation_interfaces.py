@@ -9,7 +9,7 @@ of entities, named poses) is left out: the standard has it told by `GetSimulator
 
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
 
 from crgame_ros.messages.contract import load_contract
@@ -22,6 +22,9 @@ from crgame_ros.simulation.setup import Setup
 from crgame_ros.version import __version__
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
+
+if TYPE_CHECKING:
+    from rclpy.action.server import ServerGoalHandle
 
 FEATURES = (
     'ENTITY_TAGS', 'ENTITY_BOUNDS', 'ENTITY_BOUNDS_BOX', 'ENTITY_CATEGORIES',
@@ -150,7 +153,7 @@ class SimulationInterfaces:
         response.result = refusal or self._told('RESULT_OK')
         return response
 
-    async def on_simulate_steps(self, goal: Any) -> object:
+    async def on_simulate_steps(self, goal: 'ServerGoalHandle') -> object:
         """Return the result of a goal of SimulateSteps, when the steps are done."""
         refusal, steps, n = self._refused_step(), goal.request.steps, None
         if refusal is None and steps:
@@ -168,7 +171,7 @@ class SimulationInterfaces:
             goal.abort()
         return self._simulate_steps.Result(result=refusal or self._told('RESULT_OK'))
 
-    def on_cancel(self, goal: Any) -> bool:
+    def on_cancel(self, goal: 'ServerGoalHandle') -> bool:
         """Withdraw the order of a goal; return whether there was one."""
         order = self._goals.get(bytes(goal.goal_id.uuid))
         if order is not None:
@@ -263,7 +266,7 @@ class SimulationInterfaces:
         return self._told('RESULT_OK') if problem is None else self._told(
             'RESULT_OPERATION_FAILED', problem)
 
-    def _tell(self, goal: Any, count: int) -> None:
+    def _tell(self, goal: 'ServerGoalHandle', count: int) -> None:
         """Tell how many steps of a goal are done; a failure costs only this."""
         attempt(self._node, lambda: goal.publish_feedback(self._simulate_steps.Feedback(
             completed_steps=count, remaining_steps=goal.request.steps - count)))

@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measuring the loop: the causes of each late step."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import gc
 from itertools import pairwise
 import signal
 import time
 from types import FrameType
-from typing import Any
 
 from crgame_ros.timing.late_step import (
     Causes,
@@ -52,7 +51,7 @@ class StepWatch:
         self._continued = False
         self._stolen = self._counters.stolen()
         # The previous handler of the signal.
-        self._before: Any = None
+        self._before: Callable[[int, FrameType | None], object] | int | None = None
 
     def __enter__(self) -> 'StepWatch':
         """Start observing garbage collections and the signal that ends a stop."""
