@@ -5,12 +5,13 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
-from typing import Any
+from typing import Any, TypedDict
 
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.messages.status_values import BRAKING, Status, status_truth
 
 OK, ERROR = 0, 2
+Violation = TypedDict('Violation', {'vehicle': str, 'with': str, 't': float}, total=False)
 # Late traffic is reported at each late tick, and its end is never reported [s].
 LATE_TRAFFIC_S = 2.0
 # A stopped vehicle that touches the same object again within this time has one contact [s].
@@ -77,8 +78,8 @@ class RunStatus:
         self.criticality: dict[str, dict[str, object]] = {}
         self.seats_lost = {}
         self.devices = {}
-        self.contacts: list[dict[str, Any]] = []
-        self.departures: list[dict[str, Any]] = []
+        self.contacts: list[Violation] = []
+        self.departures: list[Violation] = []
         self._stops: dict[FiredEvent, float] = {}
         self._traffic_late_t = -math.inf
         self._calm()

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.errors import InputError, PlanningError
@@ -177,7 +177,7 @@ class AgentGame:
         self.game.begin(seed, [] if self._criticality is None else [self._criticality], start,
                         difficulty)
 
-    def act(self, actions: Mapping[str, Any]) -> None:
+    def act(self, actions: Mapping[str, object]) -> None:
         """Advance to the next decision (`DrivingGame.act`)."""
         self.game.act(actions)
 

@@ -50,51 +50,17 @@ _NEEDED: dict[str, tuple[str, ...]] = {
                      SessionEvent.SKIPPED, SessionEvent.REPEATED, SessionEvent.PRACTISED),
                     ('item',))}
 
-
-class JournalEntry(TypedDict, total=False):
-    """An entry: values that are not there may be None as well; a float is any number."""
-
-    at: float
-    entry: str
-    item: str
-    participant: str
-    language: str
-    run: str
-    name: str
-    text: str
-    reason: str
-    outcome: str
-    group: str
-    page: str
-    condition: str
-    attempt: int
-    place: int
-    contacts: int
-    departures: int
-    drives: int
-    slot: int
-    time_s: float
-    end_time_s: float
-    start_at: float
-    asked_at: float
-    shown_at: float
-    answered_at: float
-    taken_s: float
-    clean_s: float
-    held: bool
-    good: bool
-    items: list[str]
-    doubts: list[str]
-    asked: list[str]
-    members: list[str]
-    answers: dict[str, Answer]
-    software: dict[str, object]
-    after_s: dict[str, object]
-    quality: dict[str, object]
-    consent: dict[str, object]
-    strata: dict[str, object]
-
-
+# Values that are not there may be None as well; a float is any number.
+JournalEntry = TypedDict('JournalEntry', {  # noqa: UP013
+    'at': float, 'entry': str, 'item': str, 'participant': str, 'language': str, 'run': str,
+    'name': str, 'text': str, 'reason': str, 'outcome': str, 'group': str, 'page': str,
+    'condition': str, 'attempt': int, 'place': int, 'contacts': int, 'departures': int,
+    'drives': int, 'slot': int, 'time_s': float, 'end_time_s': float, 'start_at': float,
+    'asked_at': float, 'shown_at': float, 'answered_at': float, 'taken_s': float,
+    'clean_s': float, 'held': bool, 'good': bool, 'items': list[str], 'doubts': list[str],
+    'asked': list[str], 'members': list[str], 'answers': dict[str, Answer],
+    'software': dict[str, object], 'after_s': dict[str, object], 'quality': dict[str, object],
+    'consent': dict[str, object], 'strata': dict[str, object]}, total=False)
 _TYPES = {name: get_origin(kind) or kind for name, kind in get_type_hints(JournalEntry).items()}
 # Times of the wall clock are the largest numbers; until the year 5138 [s since 1970].
 _LARGEST = 1e11

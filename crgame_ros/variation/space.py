@@ -221,7 +221,7 @@ class VariantSpace:
 
         :raises InputError: if a key of it cannot be set.
         """
-        values: Any = self.values
+        values = dict(self.values)
         for path, source, place in self._set:
             value = source.value(variant) if isinstance(source, Expression) else variant[source]
             values = with_value(values, path, value, place)

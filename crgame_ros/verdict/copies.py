@@ -120,6 +120,7 @@ def placed(values: Any, place: Placement) -> Any:
     if not isinstance(values, dict):
         return values
     found: dict[str, object] = {}
+    side = -1.0 if place.mirrored else 1.0
     for key, value in values.items():
         if key == 'at' and isinstance(value, list):
             found[key] = [*place.point(*value[:2]), *map(place.yaw, value[2:])]
@@ -131,7 +132,9 @@ def placed(values: Any, place: Placement) -> Any:
         elif key == 'd' and place.mirrored:
             found[key] = -value
         elif key == 'sensors':
-            found[key] = [_mounted(each, place) for each in value]
+            # They are on their vehicle: only left and right may change.
+            found[key] = [{name: side * part if name in ('y', 'yaw') else part
+                           for name, part in each.items()} for each in value]
         elif key in _ID and isinstance(value, int):
             found[key] = value + place.added
         elif key in _IDS:
@@ -145,12 +148,6 @@ def placed(values: Any, place: Placement) -> Any:
         if 'radius' not in values:
             found['yaw'] = place.yaw(values.get('yaw', 0.0))
     return found
-
-
-def _mounted(sensor: dict[str, Any], place: Placement) -> dict[str, Any]:
-    """Return a sensor, which is on its vehicle: only left and right may change."""
-    side = -1.0 if place.mirrored else 1.0
-    return {key: side * value if key in ('y', 'yaw') else value for key, value in sensor.items()}
 
 
 def _renamed(value: object, place: Placement) -> object:

@@ -361,7 +361,7 @@ class SimControl:
             if parameter.name == 'real_time_factor':
                 self.real_time_factor = float(parameter.value)
 
-    def _on_start(self, _: Any, response: object) -> object:
+    def _on_start(self, _: object, response: object) -> object:
         if self.over:
             return _answer(response, False, OVER)
         self.start()

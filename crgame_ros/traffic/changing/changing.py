@@ -4,7 +4,7 @@
 
 from dataclasses import dataclass
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.traffic.changing.courtesy import (
     CourtesyRules,
@@ -211,9 +211,8 @@ class Wish:
         """Return some of them."""
         if rows.all():
             return self
-        columns: list[Any] = [column[rows] for column in self.beside]
         return Wish(self.slots[rows], self.side[rows], self.urgency[rows], self.room[rows],
-                    Beside(*columns))
+                    Beside._make(column[rows] for column in self.beside))
 
 
 class LaneChanges:
