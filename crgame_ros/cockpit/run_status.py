@@ -5,13 +5,15 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
-from typing import Any, TypedDict
+from typing import TypedDict
 
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.messages.status_values import BRAKING, Status, status_truth
 
 OK, ERROR = 0, 2
 Violation = TypedDict('Violation', {'vehicle': str, 'with': str, 't': float}, total=False)
+Verdict = TypedDict('Verdict', {  # noqa: UP013
+    'collision': bool, 'off_road': bool, 'hit': list[str]}, total=False)
 # Late traffic is reported at each late tick, and its end is never reported [s].
 LATE_TRAFFIC_S = 2.0
 # A stopped vehicle that touches the same object again within this time has one contact [s].
@@ -74,7 +76,7 @@ class RunStatus:
         self.countdown_s = 0
         self.timing: dict[str, object] | None = None
         self.planners: dict[str, dict[str, object]] = {}
-        self.drivability: dict[str, dict[str, Any]] = {}
+        self.drivability: dict[str, Verdict] = {}
         self.criticality: dict[str, dict[str, object]] = {}
         self.seats_lost = {}
         self.devices = {}
@@ -231,7 +233,7 @@ class RunStatus:
         off_road = values.get('road_compliance') == 'false'
         hit = [item for item in values.get('hit', '').split(',') if item]
         self._note_violations(vehicle, hit, off_road, t)
-        verdict = {'collision': collision, 'off_road': off_road, 'hit': hit}
+        verdict: Verdict = {'collision': collision, 'off_road': off_road, 'hit': hit}
         self.verdicts += verdict != self.drivability.get(vehicle)
         self.drivability[vehicle] = verdict
         self._alarm('collision', vehicle, collision, 'collision with ' + ', '.join(hit), t)

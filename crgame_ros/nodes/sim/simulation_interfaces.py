@@ -9,7 +9,7 @@ of entities, named poses) is left out: the standard has it told by `GetSimulator
 
 from functools import partial
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
 
 from crgame_ros.messages.contract import load_contract
@@ -25,6 +25,7 @@ from rclpy.node import Node
 
 if TYPE_CHECKING:
     from rclpy.action.server import ServerGoalHandle
+    from simulation_interfaces import srv
 
 FEATURES = (
     'ENTITY_TAGS', 'ENTITY_BOUNDS', 'ENTITY_BOUNDS_BOX', 'ENTITY_CATEGORIES',
@@ -98,7 +99,7 @@ class SimulationInterfaces:
         self._setup = simulation.setup
         self._entities.show(simulation)
 
-    def on_features(self, _: object, response: Any) -> object:
+    def on_features(self, _: object, response: 'srv.GetSimulatorFeatures.Response') -> object:
         """Answer GetSimulatorFeatures."""
         features = self._msg.SimulatorFeatures
         response.features = features(
@@ -108,13 +109,14 @@ class SimulationInterfaces:
             'centre. See docs/nodes.md.')
         return response
 
-    def on_get_state(self, _: object, response: Any) -> object:
+    def on_get_state(self, _: object, response: 'srv.GetSimulationState.Response') -> object:
         """Answer GetSimulationState."""
         response.state = self._states(state=self._present())
         response.result = self._told('RESULT_OK')
         return response
 
-    async def on_set_state(self, request: Any, response: Any) -> object:
+    async def on_set_state(self, request: 'srv.SetSimulationState.Request',
+                           response: 'srv.SetSimulationState.Response') -> object:
         """Answer SetSimulationState, as soon as it is there."""
         states, control = self._states, self._control
         target, present = request.state.state, self._present()
@@ -144,7 +146,8 @@ class SimulationInterfaces:
             result=response.STATE_TRANSITION_ERROR, error_message=problem)
         return response
 
-    async def on_step(self, request: Any, response: Any) -> object:
+    async def on_step(self, request: 'srv.StepSimulation.Request',
+                      response: 'srv.StepSimulation.Response') -> object:
         """Answer StepSimulation, when the steps are done."""
         refusal = self._refused_step()
         if refusal is None and request.steps:
@@ -178,7 +181,8 @@ class SimulationInterfaces:
             self._control.withdraw(order)
         return order is not None
 
-    async def on_reset(self, request: Any, response: Any) -> object:
+    async def on_reset(self, request: 'srv.ResetSimulation.Request',
+                       response: 'srv.ResetSimulation.Response') -> object:
         """Answer ResetSimulation, when it is done."""
         if request.scope not in (request.SCOPE_DEFAULT, request.SCOPE_STATE, request.SCOPE_ALL):
             response.result = self._told(
@@ -188,12 +192,13 @@ class SimulationInterfaces:
         response.result = self._after_reset(await self._control.reset())
         return response
 
-    def on_get_world(self, _: object, response: Any) -> object:
+    def on_get_world(self, _: object, response: 'srv.GetCurrentWorld.Response') -> object:
         """Answer GetCurrentWorld."""
         response.result, response.world = self._told('RESULT_OK'), self._world()
         return response
 
-    async def on_load_world(self, request: Any, response: Any) -> object:
+    async def on_load_world(self, request: 'srv.LoadWorld.Request',
+                            response: 'srv.LoadWorld.Response') -> object:
         """Answer LoadWorld, when the world is there and stands at its first step."""
         # In version 2 the two are in a message of their own.
         resource = getattr(request, 'world_resource', request)
