@@ -23,8 +23,6 @@ except ImportError as _error:
     raise ImportError('crgame_ros.gym.parallel_env needs the package pettingzoo, which is not '
                       f'installed: {extra_install("gym")}', name='pettingzoo') from _error
 
-_MODES = ['rgb_array']
-
 
 class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
     """
@@ -40,12 +38,12 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
     """
 
     metadata: ClassVar[dict[str, object]] = {
-        'name': 'crgame_v0', 'render_modes': _MODES, 'render_fps': FRAMES_PER_S,
+        'name': 'crgame_v0', 'render_modes': ['rgb_array'], 'render_fps': FRAMES_PER_S,
         'is_parallelizable': True}
 
     def __init__(self, seats: Sequence[str] | None = None, render_mode: str | None = None,
                  **keywords: Any) -> None:
-        check_render_mode(render_mode, _MODES)
+        check_render_mode(render_mode, ['rgb_array'])
         if seats is None:
             # Without seats of agents, a game has those of its file.
             seats = Episodes(make_experiment((), **keywords)).agent.setups.base.vehicle_ids

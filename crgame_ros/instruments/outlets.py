@@ -16,16 +16,13 @@ import os
 from pathlib import Path
 import platform
 import socket
-from typing import TYPE_CHECKING, TypeVar
+from typing import Any, TypeVar
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.instruments_spec import InstrumentsSpec
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from crgame_ros.vehicle.state import StateColumn
 from crgame_ros.version import __version__
-
-if TYPE_CHECKING:
-    from pylsl import StreamInfo
 
 # Begins the ids of streams of this package.
 OWN = 'crgame_ros/'
@@ -184,7 +181,7 @@ class Outlet:
         self._outlet.push_sample(values, steady_s)
 
 
-def _describe(info: 'StreamInfo', stream: StreamDescription) -> None:
+def _describe(info: Any, stream: StreamDescription) -> None:
     """Describe the channels as XDF has it (https://github.com/sccn/xdf/wiki/Meta-Data)."""
     channels = info.desc().append_child('channels')
     for channel in stream.channels:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from datetime import date, datetime, time
 from importlib.metadata import distribution
 from io import BytesIO
-from typing import TypeAlias
 from xml.etree import ElementTree
 
 from crgame_ros.errors import CrgameError, InputError, one_line
@@ -35,7 +34,6 @@ from numpy.typing import NDArray
 from scenariogeneration import xosc
 
 FloatArray = NDArray[np.float64]
-Entity: TypeAlias = xosc.Vehicle | xosc.Pedestrian | xosc.MiscObject
 _MINOR_VERSION = 2
 _SCHEMA = 'schemas/OpenSCENARIO_1_2.xsd'
 _LIGHTS = COMMAND_COLUMNS.index('lights')
@@ -162,7 +160,7 @@ def _omissions(log: RunTrajectories, original: etree._Element, road: str | None)
 
 
 def _tracks(log: RunTrajectories, times_s: FloatArray,
-            notices: list[str]) -> list[tuple[_Track, Entity]]:
+            notices: list[str]) -> list[tuple[_Track, object]]:
     """Return the motion and the entity of each vehicle and of each object that appeared."""
     states = log.finite_vehicle_states
     seen = np.isfinite(log.object_poses).all(axis=2).any(axis=0)
@@ -286,7 +284,7 @@ class Body:
     :param ahead: from the reference point of its recorded poses forward to that of the entity [m]
     """
 
-    entity: Entity
+    entity: xosc.Vehicle | xosc.Pedestrian | xosc.MiscObject
     ahead: float
 
 

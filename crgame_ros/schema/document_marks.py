@@ -5,14 +5,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 import math
-from typing import Any, get_args, TYPE_CHECKING
+from typing import Any, get_args
 
 from crgame_ros.schema.marks import Handler
 from crgame_ros.schema.reading import read
 from crgame_ros.schema.writing import write
-
-if TYPE_CHECKING:
-    from pydantic import ValidationInfo
 
 
 @dataclass(frozen=True)
@@ -124,7 +121,7 @@ class Declared:
         return write(value)
 
 
-def _plain_schema(read_value: 'Callable[[object, ValidationInfo], object]',
+def _plain_schema(read_value: Callable[[object, Any], object],
                   write_value: Callable[[object], object]) -> object:
     """Return the schema of a value that two functions read and write."""
     return {'type': 'function-plain', 'function': {'type': 'with-info', 'function': read_value},

@@ -4,7 +4,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell import CellRows
@@ -22,9 +21,7 @@ from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.objects import Role
 from crgame_ros.search.settings import SearchSettings
 from crgame_ros.variation.space import Variant
-
-if TYPE_CHECKING:
-    from distributed import Client
+from distributed import Client
 
 # Variants that are run before any of their outcomes is told.
 _TOGETHER = 32
@@ -84,7 +81,7 @@ class Trials:
 
     def __init__(self, settings: SearchSettings, expectations: Sequence[Expectation],
                  place: EvaluationFolder, plan: EvaluationPlan, grid: CellGrid,
-                 parts: ResultParts, client: 'Client', limits: Limits,
+                 parts: ResultParts, client: Client, limits: Limits,
                  told: Callable[[Outcome, bool], object]) -> None:
         self._settings, self._expectations = settings, expectations
         self._place, self._plan, self._parts = place, plan, parts
