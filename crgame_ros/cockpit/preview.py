@@ -156,8 +156,7 @@ def _choice(chosen: Mapping[str, str], vehicle: str, own: str, allowed: list[str
     return value
 
 
-def _refuse_strangers(chosen: Mapping[str, object],
-                      specs: list[HumanSpec] | list[AvSpec]) -> None:
+def _refuse_strangers(chosen: Mapping[str, object], specs: list[HumanSpec] | list[AvSpec]) -> None:
     if not chosen.keys() <= {spec.id for spec in specs}:
         raise InputError('names a vehicle that the game does not have', 'choice',
                          'load the page again')

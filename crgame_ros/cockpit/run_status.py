@@ -218,8 +218,7 @@ class RunStatus:
         self.timing['frame_skipping'] = skipping
         self._alarm('late', 'simulation', skipping, 'late: frames are skipped', t)
 
-    def _add_recording(self, level: int, text: str, values: Mapping[str, str],
-                       t: float) -> None:
+    def _add_recording(self, level: int, text: str, values: Mapping[str, str], t: float) -> None:
         failed = level == ERROR
         megabytes = (_number(values.get('bytes')) or 0.0) / 1e6
         self.recording = {
@@ -239,8 +238,7 @@ class RunStatus:
         self._alarm('collision', vehicle, collision, 'collision with ' + ', '.join(hit), t)
         self._alarm('off_road', vehicle, off_road, 'off the road', t)
 
-    def _note_violations(self, vehicle: str, hit: Sequence[str], off_road: bool,
-                         t: float) -> None:
+    def _note_violations(self, vehicle: str, hit: Sequence[str], off_road: bool, t: float) -> None:
         """Record the violations of a verdict that the one before did not have."""
         for other in hit:
             # Both of two driven vehicles report their contact.

@@ -61,8 +61,7 @@ def simplified(vertices: Points) -> Points:
     :return: the vertices that are left, including the first and the last
     """
     points = np.asarray(vertices, dtype=np.float64)
-    kept = shapely.get_coordinates(
-        shapely.simplify(shapely.LineString(points[:, :2]), TOLERANCE))
+    kept = shapely.get_coordinates(shapely.simplify(shapely.LineString(points[:, :2]), TOLERANCE))
     if points.shape[1] < 3:
         return kept
     steps = np.hypot(*np.diff(points[:, :2], axis=0).T)

@@ -209,8 +209,7 @@ class JoinedMotion:
         bend = ((curvature + beyond) * inner / math.cos(turn) - curvature) \
             * inner / math.cos(turn) ** 2 - curvature * slope * math.tan(turn)
         for across_s in ACROSS_TIMES_S:
-            states = self._across(speeds, ways, across_s * max(speed, SLOW),
-                                  (offset, slope, bend))
+            states = self._across(speeds, ways, across_s * max(speed, SLOW), (offset, slope, bend))
             if self._can_steer(states):
                 states[0] = vehicle
                 return states

@@ -202,8 +202,7 @@ def packed_content(packed: Mapping[str, bytes]) -> Mapping[str, bytes]:
     return packed
 
 
-def compute(batch: str, contents: Mapping[str, Mapping[str, bytes]],
-            limits: Limits) -> list[str]:
+def compute(batch: str, contents: Mapping[str, Mapping[str, bytes]], limits: Limits) -> list[str]:
     """
     Compute a batch of cells in the process of this worker's thread, one after the other.
 

@@ -179,8 +179,7 @@ def _write(folder: Path, grid: CellGrid, scene: CellScene,
     planners = [planner.label for planner in grid.planners]
     if len(planners) > 1:
         axes.append({'name': 'planner', 'values': planners})
-    points = [_point(row, vehicles, expectations, goals)
-              for row, vehicles in rows]
+    points = [_point(row, vehicles, expectations, goals) for row, vehicles in rows]
     failures = sum(point.verdict == 'failure' for point in points)
     view = VariantsView(
         f'{scene.label}: its variants',

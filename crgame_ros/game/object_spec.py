@@ -296,8 +296,7 @@ class ObjectSpec:
     path: Annotated[tuple[Point, ...], Listed(2, 1000, 'way-point'), OnlyWith(('path',))] = ()
     trajectory: Annotated[tuple[TrajectoryRow, ...], Rows(), OnlyWith(('trajectory',))] = ()
     shift: Annotated[float, Within(-1e4, 1e4), OnlyWith(('trajectory',)), LeftOut()] = 0.0
-    speed_factor: Annotated[float, Within(0.1, 10.0), OnlyWith(('trajectory',)),
-                            LeftOut()] = 1.0
+    speed_factor: Annotated[float, Within(0.1, 10.0), OnlyWith(('trajectory',)), LeftOut()] = 1.0
     lanelet: Annotated[int | None, OnlyWith(('lanelet',)),
                        Advice('give the id of a lanelet')] = None
     s: Annotated[float, Within(0.0, MAX_COORDINATE), OnlyWith(('lanelet',))] = 0.0

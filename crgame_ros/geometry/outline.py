@@ -50,12 +50,10 @@ def placed(corners: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[
     yaw = poses[..., 2, None]
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y = corners[..., 0], corners[..., 1]
-    return joined(poses[..., 0, None] + cos * x - sin * y,
-                  poses[..., 1, None] + sin * x + cos * y)
+    return joined(poses[..., 0, None] + cos * x - sin * y, poses[..., 1, None] + sin * x + cos * y)
 
 
-def placed_at(corners: NDArray[np.float64], x: float, y: float,
-              yaw: float) -> NDArray[np.float64]:
+def placed_at(corners: NDArray[np.float64], x: float, y: float, yaw: float) -> NDArray[np.float64]:
     """Place corners (C, 2) at one pose of their centre: `placed` in a third of its time."""
     cos, sin = math.cos(yaw), math.sin(yaw)
     return np.asarray(corners @ np.array(((cos, sin), (-sin, cos))) + (x, y))

@@ -220,8 +220,7 @@ class AgentGame:
         scheduler = game.simulation.scheduler
         measures = None if self._criticality is None else next(
             tick for tick in self._criticality.latest if tick.subject == seat.row)
-        goal = self._goals[seat.id].is_met(
-            seat.state, scheduler.k(game.simulation.n))
+        goal = self._goals[seat.id].is_met(seat.state, scheduler.k(game.simulation.n))
         collision = bool(seat.hit)
         reward, terms = experiment.reward.compute(Decision(
             experiment.ticks * scheduler.time_step_s, seat.before[0], seat.state, seat.place,

@@ -34,11 +34,9 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32] | np.int64]):
     :raises InputError: if a keyword is wrong.
     """
 
-    metadata = {
-        'render_modes': ['human', 'rgb_array'], 'render_fps': FRAMES_PER_S}
+    metadata = {'render_modes': ['human', 'rgb_array'], 'render_fps': FRAMES_PER_S}
 
-    def __init__(self, seat: str = 'av0', render_mode: str | None = None,
-                 **keywords: Any) -> None:
+    def __init__(self, seat: str = 'av0', render_mode: str | None = None, **keywords: Any) -> None:
         check_render_mode(render_mode, self.metadata['render_modes'])
         self.experiment = make_experiment((seat,), **keywords)
         self.render_mode = render_mode

@@ -73,8 +73,7 @@ class PerceptionNode(Node):
                 self._world.begin(scenario)
             message = self._true.latest()
             if message is not None:
-                self._asked = from_joint_trajectory(
-                    message, f'/{self._vehicle_id}/true_request')
+                self._asked = from_joint_trajectory(message, f'/{self._vehicle_id}/true_request')
             for step in self._world.steps():
                 self._observe(step)
             self._answer()

@@ -202,8 +202,7 @@ class RayCaster(Sensor):
         enter = np.minimum(first, second).max(axis=1)
         leave = np.maximum(first, second).min(axis=1)
         met = np.flatnonzero((enter <= leave) & (leave >= 0.0))
-        return (ray[met], np.maximum(enter[met], 0.0),
-                np.full(len(met), PERMANENT, dtype=np.intp))
+        return (ray[met], np.maximum(enter[met], 0.0), np.full(len(met), PERMANENT, dtype=np.intp))
 
 
 def _cross(a: Array, b: Array) -> Array:

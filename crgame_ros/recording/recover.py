@@ -197,8 +197,7 @@ def _register(source: McapFile, number: int, writer: Writer, schemas: dict[int, 
     channel = source.channels[number]
     schema = source.schemas.get(channel.schema_id)
     if schema is not None and schema.id not in schemas:
-        schemas[schema.id] = writer.register_schema(
-            schema.name, schema.encoding, schema.data)
+        schemas[schema.id] = writer.register_schema(schema.name, schema.encoding, schema.data)
     channels[number] = writer.register_channel(
         channel.topic, channel.message_encoding, schemas.get(channel.schema_id, 0),
         channel.metadata)

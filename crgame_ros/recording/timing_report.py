@@ -200,8 +200,7 @@ def _contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleDrivabili
               ) -> tuple[list[ContactEntry] | None, tuple[str, ...]]:
     """Return the entries of the contacts, or None and the reason if they are not known."""
     try:
-        return [item.as_dict() for item in recorded_contacts(
-            reader, run, verdicts, fired)], ()
+        return [item.as_dict() for item in recorded_contacts(reader, run, verdicts, fired)], ()
     except (InputError, ValueError, GEOSException) as error:
         # States from another sender may have no outlines.
         return None, (f'contacts are not named: {error}',)

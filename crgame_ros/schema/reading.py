@@ -317,8 +317,7 @@ class _Reader:
                     and (wording is None or wording.fits(given)) and (given or plain is str):
                 if plain is Path:
                     sought = mark_of(marks, Sought)
-                    return self._base / given if sought is None \
-                        else sought.find(given, self._base)
+                    return self._base / given if sought is None else sought.find(given, self._base)
                 named = mark_of(marks, Named)
                 return given if named is None else named.resolved(given, self._base)
         elif isinstance(plain, type) and isinstance(given, plain):

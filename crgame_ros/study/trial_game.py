@@ -108,8 +108,7 @@ def _written_game(settings: TrialSettings) -> Game:
     return Game(scenario, humans=humans)
 
 
-def _spec(kind: type[T], name: str | None, nothing: str,
-          what: str) -> T | Literal['own'] | None:
+def _spec(kind: type[T], name: str | None, nothing: str, what: str) -> T | Literal['own'] | None:
     if name in (None, OWN):
         return OWN
     if name == nothing:

@@ -127,8 +127,7 @@ def placed(values: Any, place: Placement) -> Any:
         elif key == 'path' and isinstance(value, list):
             found[key] = [place.point(*each) for each in value]
         elif key == 'trajectory' and isinstance(value, list):
-            found[key] = [[t, *place.point(x, y), *map(place.yaw, yaw)]
-                          for t, x, y, *yaw in value]
+            found[key] = [[t, *place.point(x, y), *map(place.yaw, yaw)] for t, x, y, *yaw in value]
         elif key == 'd' and place.mirrored:
             found[key] = -value
         elif key == 'sensors':

@@ -92,8 +92,7 @@ class WaypointRoads:
     :raises InputError: if there is no lane, or a link names one that does not exist.
     """
 
-    def __init__(self, lanes: Mapping[int, WaypointLane],
-                 links: Mapping[int, LaneLinks]) -> None:
+    def __init__(self, lanes: Mapping[int, WaypointLane], links: Mapping[int, LaneLinks]) -> None:
         if not lanes:
             raise InputError('there is no lane', 'way-point roads', 'give one at least')
         self._lanes = dict(lanes)

@@ -169,8 +169,7 @@ def _rows() -> Iterator[tuple[str, Callable[[Run], str]]]:
     yield 'time below the threshold of TTC [s]', lambda run: number(sum(
         each.exposures['tet_s'] for each in run.usual_criticality.report()))
     yield 'least PET [s]', _least_pet
-    yield 'contacts', lambda run: NOTHING if run.contacts is None \
-        else str(len(run.contacts))
+    yield 'contacts', lambda run: NOTHING if run.contacts is None else str(len(run.contacts))
     yield 'violations', lambda run: NOTHING if run.outcome is None \
         else str(run.outcome['drivability']['violations'])
     yield 'events that took effect', lambda run: str(len(run.record.fired))

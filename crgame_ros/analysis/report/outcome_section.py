@@ -147,8 +147,7 @@ def criticality_section(run: Run) -> Section:
     return Section('criticality', 'Criticality', html, tuple(_plots(run, limits)))
 
 
-def _worst(run: Run, vehicle: VehicleCriticality,
-           limits: Thresholds) -> Iterator[Sequence[str]]:
+def _worst(run: Run, vehicle: VehicleCriticality, limits: Thresholds) -> Iterator[Sequence[str]]:
     for name, measure in MEASURES.items():
         worst = vehicle.worst.get(name)
         if worst is None or name == TWICE or not measure.matters(worst.value):

@@ -267,8 +267,7 @@ class Run:
         if self.bag is None:
             return None
         from crgame_ros.recording.recorded_plans import read_plans
-        return partial(read_plans, self.bag, self.game.epoch,
-                       self.telling('reading the plans of'))
+        return partial(read_plans, self.bag, self.game.epoch, self.telling('reading the plans of'))
 
     def measure(self, on_tick: 'Callable[[Criticality], object]' = lambda _: None,
                 ) -> 'Criticality':

@@ -43,8 +43,7 @@ class Column:
     @property
     def kind(self) -> str:
         """Return the name of its type in Table Schemas: number, integer, string or boolean."""
-        return {NUMBER: 'number', INTEGER: 'integer', TEXT: 'string',
-                FLAG: 'boolean'}[self.type]
+        return {NUMBER: 'number', INTEGER: 'integer', TEXT: 'string', FLAG: 'boolean'}[self.type]
 
     @property
     def notes(self) -> dict[str, str]:

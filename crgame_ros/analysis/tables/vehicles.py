@@ -155,8 +155,7 @@ def _criticality(run: Run) -> Mapping[str, Sequence[object]]:
         worst = [None if each is None else each.worst.get(name) for each in found]
         columns[f'worst_{name}'] = [None if each is None else each.value for each in worst]
         columns[f'worst_{name}_of'] = [None if each is None else each.other for each in worst]
-        columns[f'worst_{name}_time_s'] = [None if each is None else each.time_s
-                                           for each in worst]
+        columns[f'worst_{name}_time_s'] = [None if each is None else each.time_s for each in worst]
     columns['max_inverse_ttc'] = [
         None if each is None else 0.0 if (least := each.worst.get('ttc')) is None
         else 1.0 / max(least.value, LEAST_TTC_S) for each in found]

@@ -171,8 +171,7 @@ class ResultParts:
         for name in _part_names(earlier):
             _move(earlier, name, self.folder, is_wanted_again)
         for name in before:
-            away += _move(self.folder, name, earlier,
-                          lambda key, status: not wanted(key, status))
+            away += _move(self.folder, name, earlier, lambda key, status: not wanted(key, status))
         self._start_journal(_next_number(self.folder))
         return away
 
@@ -244,8 +243,7 @@ def _joinable(folder: Path, most_cells: int) -> list[list[str]]:
     return [names for names in groups if len(names) > 1]
 
 
-def _write_joined(folder: Path, names: Sequence[str], table: TableDeclaration,
-                  path: Path) -> None:
+def _write_joined(folder: Path, names: Sequence[str], table: TableDeclaration, path: Path) -> None:
     """Write the rows of some parts of a table, in their order."""
     rows = pa.concat_tables([_read(folder / table.name / name) for name in names])
     pq.write_table(rows.combine_chunks(), path, compression='zstd')

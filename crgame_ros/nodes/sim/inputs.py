@@ -52,8 +52,7 @@ class SimInputs:
         self._node = node
         self._clock_offset_ns = clock_offset_ns
         endpoints = Endpoints(node)
-        self.seats = Seats(
-            endpoints, setup, clock_offset_ns, seat_sources, recorded, tenants)
+        self.seats = Seats(endpoints, setup, clock_offset_ns, seat_sources, recorded, tenants)
         # Orders to planners to start or stop, until the loop reads them.
         self.planner_orders: dict[str, bool] = {}
         self._services = [

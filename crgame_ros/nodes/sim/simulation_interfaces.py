@@ -37,8 +37,7 @@ FEATURES = (
 KINDS = {'.xml': 'scenario', '.yaml': 'game', '.yml': 'game'}
 
 
-def offer_simulation_interfaces(node: Node, control: SimControl
-                                ) -> 'SimulationInterfaces | None':
+def offer_simulation_interfaces(node: Node, control: SimControl) -> 'SimulationInterfaces | None':
     """Offer the standard's services on a node; None where its package is not installed."""
     contract = load_contract()
     if not contract.actions['/simulate_steps'].available:

@@ -91,8 +91,7 @@ class StepWatch:
         if phase is Phase.SERVICES:
             self._stolen = self._counters.stolen()
 
-    def explain(self, due_ns: int, late_s: float, factor: float
-                ) -> tuple[Causes, Phase | None]:
+    def explain(self, due_ns: int, late_s: float, factor: float) -> tuple[Causes, Phase | None]:
         """
         Return why the cycle whose first phase was marked last is late, and discard the one before.
 
@@ -156,8 +155,7 @@ class StepWatch:
             end, last = time.thread_time_ns(), len(counts) - 1
         first = counts[0]
         waited_ns = (counts[last].waited_ns or 0) - (first.waited_ns or 0)
-        return max(0, counts[last].wall_ns - first.wall_ns - waited_ns
-                   - (end - first.computed_ns))
+        return max(0, counts[last].wall_ns - first.wall_ns - waited_ns - (end - first.computed_ns))
 
     def _on_collection(self, phase: str, _info: dict[str, int]) -> None:
         now_ns = time.monotonic_ns()

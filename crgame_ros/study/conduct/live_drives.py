@@ -284,8 +284,7 @@ class LiveDrives:
         self._set_phase(DrivePhase.PREPARING, item.id, work=DriveWork.STOPPED)
         if director.status.run != 'ended':
             await director.stop()
-        await self._until(lambda: director.status.run == 'ended', CLOSES_S,
-                          'the run does not end')
+        await self._until(lambda: director.status.run == 'ended', CLOSES_S, 'the run does not end')
 
     async def _lose(self) -> None:
         """Record the loss of the graph; another one is started for the same drive."""

@@ -95,8 +95,7 @@ def _questions(study: StudyFile) -> Iterator[tuple[SessionItem, Questions, int]]
     """Yield the items with questionnaires, and how often each was asked before at that point."""
     seen: dict[tuple[str, str], int] = {}
     # A step may be only for some groups; equal ids are the same step.
-    items = {item.id: item for group in study.group_names
-             for item in session_of(study, 0, group)}
+    items = {item.id: item for group in study.group_names for item in session_of(study, 0, group)}
     for item in items.values():
         if isinstance(item.what, Questions):
             place = _place(item.id), item.what.name

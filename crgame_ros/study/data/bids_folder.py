@@ -261,8 +261,7 @@ def _events(record: ParticipantRecord,
             continue
         if kind == 'trial_started' and attempt is not None:
             kind = 'trial'
-            duration = None if attempt.ended_at is None \
-                else attempt.ended_at - attempt.started_at
+            duration = None if attempt.ended_at is None else attempt.ended_at - attempt.started_at
             name = attempt.says('outcome') or attempt.ending
             value = attempt.says('reason')
         yield [onset, duration, kind, None if attempt is None else

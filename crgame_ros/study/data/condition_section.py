@@ -141,8 +141,7 @@ def participant_means(rows: Iterable[Mapping[str, object]], column: str,
 
 def _half(values: NDArray[np.float64]) -> float:
     count = len(values)
-    return math.nan if count < 2 else float(
-        _t(count - 1) * values.std(ddof=1) / math.sqrt(count))
+    return math.nan if count < 2 else float(_t(count - 1) * values.std(ddof=1) / math.sqrt(count))
 
 
 def _mean(values: NDArray[np.float64]) -> float:
@@ -294,8 +293,7 @@ def condition_section(data: StudyData) -> str:
     html = note('Of each participant and condition the mean over its trials is taken, then the '
                 'mean over participants. Points are participants, squares are means with their '
                 '95 % intervals.')
-    return html + ''.join(_block(data, names, blocks[names], len(blocks) > 1)
-                          for names in blocks)
+    return html + ''.join(_block(data, names, blocks[names], len(blocks) > 1) for names in blocks)
 
 
 def interval_note(means: Sequence[ConditionMeans]) -> str:

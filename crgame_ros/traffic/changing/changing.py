@@ -336,8 +336,7 @@ class LaneChanges:
         taken: list[tuple[int, float]] = []
         row = np.flatnonzero(chosen)
         for i in row[np.lexsort((wish.slots[row], -gain[row]))].tolist():
-            slot, lane, s = (int(wish.slots[i]), int(wish.beside.lane[i]),
-                             float(wish.beside.s[i]))
+            slot, lane, s = (int(wish.slots[i]), int(wish.beside.lane[i]), float(wish.beside.s[i]))
             room = 10.0 + float(agents.length[slot]) + float(agents.speed[slot])
             if slot in begun or any(lane == other and abs(s - at) < room for other, at in taken):
                 continue
