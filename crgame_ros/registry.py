@@ -23,9 +23,8 @@ PACKAGES = {'commonroad_idm_planner': 'commonroad-idm-planner',
 # Prefix of FILE.py:load in the name of a planner or driver: a trained policy drives.
 POLICY = 'policy:'
 # Kinds of values, as text after "give".
-VALUE_WORDS: dict[object, str] = {
-    float: 'a number', int: 'a whole number', bool: 'true or false', str: 'a text',
-    types.NoneType: 'null'}
+VALUE_WORDS: dict[object, str] = {float: 'a number', int: 'a whole number', bool: 'true or false',
+                                  str: 'a text', types.NoneType: 'null'}
 # Hints of a value of any kind.
 ANY_VALUE = (object, Any)
 Model = TypeVar('Model', covariant=True)

@@ -35,9 +35,8 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
     :raises InputError: if a keyword is wrong.
     """
 
-    metadata = {
-        'render_modes': ['rgb_array'], 'render_fps': FRAMES_PER_S,
-        'autoreset_mode': AutoresetMode.NEXT_STEP}
+    metadata = {'render_modes': ['rgb_array'], 'render_fps': FRAMES_PER_S,
+                'autoreset_mode': AutoresetMode.NEXT_STEP}
 
     def __init__(self, num_envs: int = 1, seat: str = 'av0', render_mode: str | None = None,
                  **keywords: Any) -> None:
