@@ -68,7 +68,7 @@ class Inlet:
         self._connection = 0
         self.described = False
         self._inlet = pylsl.StreamInlet(info, max_buflen=BUFFER_S, recover=True,
-                                             as_numpy=self.stream.format != 'string')
+                                        as_numpy=self.stream.format != 'string')
         _attempt(lambda: self._inlet.open_stream(0.0))
 
     def poll(self) -> list[Batch]:
