@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 import hashlib
 import json
-from typing import Any, NamedTuple, TypedDict
+from typing import Any, NamedTuple
 
 from crgame_ros.evaluation.content import digests_in
 from crgame_ros.evaluation.results.cell_rows import FACTORS
@@ -127,14 +127,6 @@ class Cell(NamedTuple):
         more = [text for text in (given.perception, given.traffic, given.variant)
                 if text not in ('own', '')]
         return ' · '.join((place, given.planner, *more, f'seed {self.seed}'))
-
-
-class CellRows(TypedDict, total=False):
-    """The rows of a cell in the tables of an evaluation; a cell that failed may lack some."""
-
-    cell: dict[str, object]
-    vehicles: list[dict[str, object]]
-    work: dict[str, Any]
 
 
 def condition_of(values: Mapping[str, Any]) -> Condition:

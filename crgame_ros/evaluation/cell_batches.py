@@ -11,9 +11,10 @@ import time
 from typing import NamedTuple
 
 from crgame_ros.errors import CrgameError
-from crgame_ros.evaluation.cell import Cell, CellRows, Condition
+from crgame_ros.evaluation.cell import Cell, Condition
 from crgame_ros.evaluation.cell_process import compute, Limits, packed_content
 from crgame_ros.evaluation.content import ContentStore
+from crgame_ros.evaluation.results.cell_rows import CellRows
 from distributed import as_completed, Client, Future
 from distributed.scheduler import KilledWorker
 

@@ -20,8 +20,9 @@ import traceback
 from typing import BinaryIO, IO, NamedTuple, NoReturn
 
 from crgame_ros.errors import CrgameError
-from crgame_ros.evaluation.cell import Cell, CellRows, condition_of
+from crgame_ros.evaluation.cell import Cell, condition_of
 from crgame_ros.evaluation.content import ContentStore
+from crgame_ros.evaluation.results.cell_rows import CellRows
 from crgame_ros.evaluation.source_digest import engine_digest
 from distributed import get_worker
 

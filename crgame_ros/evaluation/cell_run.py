@@ -12,10 +12,10 @@ from typing import Any, Literal, TypeVar
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.each_minute import kind_of
-from crgame_ros.evaluation.cell import Cell, CellRows
+from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_scene import INPUTS
 from crgame_ros.evaluation.content import resolved
-from crgame_ros.evaluation.results.cell_rows import outcome_of, vehicle_rows
+from crgame_ros.evaluation.results.cell_rows import CellRows, outcome_of, vehicle_rows
 from crgame_ros.game.game import Game, parse_game
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from crgame_ros.evaluation.cell import Cell, CellRows
+from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_grid import CellGrid, make_grid
 from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.dask_cluster import check_workers, dask_client
 from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.evaluation.plan import EvaluationPlan
+from crgame_ros.evaluation.results.cell_rows import CellRows
 from crgame_ros.evaluation.results.parts import PART_CELLS, ResultParts
 
 GIGABYTE = 1_000_000_000

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.cell import CellRows
 from crgame_ros.evaluation.cell_batches import CellBatches
 from crgame_ros.evaluation.cell_grid import CellGrid
 from crgame_ros.evaluation.cell_process import Limits
@@ -15,6 +14,7 @@ from crgame_ros.evaluation.evaluation import rows_of
 from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.evaluation.judging import shortfalls, worst_of
 from crgame_ros.evaluation.plan import EvaluationPlan
+from crgame_ros.evaluation.results.cell_rows import CellRows
 from crgame_ros.evaluation.results.parts import ResultParts, stored_rows
 from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.game.expectation import Expectation

@@ -3,6 +3,7 @@
 """The rows of a cell in the tables, and the tables' declarations."""
 
 from collections.abc import Sequence
+from typing import Any, TypedDict
 
 from crgame_ros.analysis.blame.blame import blame_of, KINDS
 from crgame_ros.analysis.runs.run import Run
@@ -73,6 +74,14 @@ WORK = TableDeclaration('work', 'the computing of a cell', ('cell',), (
     Column('plan_p50_s', NUMBER, 's', 'median time that planners took to plan', empty=FAILED),
     Column('plan_max_s', NUMBER, 's', 'greatest such time', empty=FAILED)))
 TABLES_OF_CELLS = (CELLS, VEHICLES_OF_CELLS, WORK)
+
+
+class CellRows(TypedDict, total=False):
+    """The rows of a cell in the tables of an evaluation; a cell that failed may lack some."""
+
+    cell: dict[str, object]
+    vehicles: list[dict[str, object]]
+    work: dict[str, Any]
 
 
 def outcome_of(result: OfflineResult, contacts: Sequence[Contact]) -> dict[str, object]:

@@ -16,8 +16,8 @@ from typing import IO, Self
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.analysis.tables.writer import TableWriter
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.cell import CellRows
 from crgame_ros.evaluation.results.cell_rows import (
+    CellRows,
     CELLS,
     TABLES_OF_CELLS,
     VEHICLES_OF_CELLS,
