@@ -178,8 +178,7 @@ def _nuplan(found: 'NuplanScore | None') -> Iterator[tuple[str, str]]:
     yield 'nuPlan', f'{found.score:.3f} of 1'
     yield '', f'= {factors}'
     yield '', f'x mean of {mean}'
-    yield '', (f'progress {found.own_progress:.0f} m, {found.expert}: '
-               f'{found.expert_progress:.0f} m')
+    yield '', f'progress {found.own_progress:.0f} m, {found.expert}: {found.expert_progress:.0f} m'
     for each in found.collisions:
         fault = 'at fault' if each.at_fault else 'not at fault'
         yield '', (f'collision with {each.other_id} at {each.time_s:.1f} s: {each.kind}, '

@@ -6,13 +6,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 import logging
 import os
-from typing import TYPE_CHECKING
+from typing import Any
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.paths import extra_install
-
-if TYPE_CHECKING:
-    from distributed import Client
 
 INSTALL = extra_install('evaluate')
 # A cell whose worker was killed this often is probably the cause.
@@ -36,7 +33,7 @@ def require_dask() -> None:
 
 
 @contextmanager
-def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> Iterator['Client']:
+def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> Iterator[Any]:
     """
     Connect to a scheduler, or start one with workers on this machine's loopback.
 
@@ -95,7 +92,7 @@ def default_workers() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def check_workers(client: 'Client') -> None:
+def check_workers(client: Any) -> None:
     """
     Check that the workers can compute cells.
 
