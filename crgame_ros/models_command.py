@@ -35,11 +35,10 @@ REGISTRIES = {
 _WIDTH = 99
 
 
-def registry_of(kind: str) -> 'ModelRegistry':
+def registry_of(kind: str) -> 'ModelRegistry[object]':
     """Return the registry of a kind of model."""
     module, name = REGISTRIES[kind]
-    found: ModelRegistry = getattr(importlib.import_module(module), name)
-    return found
+    return getattr(importlib.import_module(module), name)
 
 
 def purpose_of(kind: type[object]) -> str:
@@ -77,7 +76,7 @@ def run(values: argparse.Namespace) -> int:
     return 0
 
 
-def _model_lines(registry: 'ModelRegistry', name: str) -> list[str]:
+def _model_lines(registry: 'ModelRegistry[object]', name: str) -> list[str]:
     try:
         text = purpose_of(registry.find(name))
     except InputError as error:

@@ -12,7 +12,7 @@ import math
 from pathlib import Path
 import sys
 import types
-from typing import Any, get_args, get_origin, get_type_hints, Literal, Union
+from typing import Any, Generic, get_args, get_origin, get_type_hints, Literal, TypeVar, Union
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.paths import share_directory
@@ -23,13 +23,14 @@ PACKAGES = {'commonroad_idm_planner': 'commonroad-idm-planner',
 # Prefix of FILE.py:load in the name of a planner or driver: a trained policy drives.
 POLICY = 'policy:'
 # Kinds of values, as text after "give".
-VALUE_WORDS = {float: 'a number', int: 'a whole number', bool: 'true or false', str: 'a text',
-               types.NoneType: 'null'}
+VALUE_WORDS: dict[object, str] = {float: 'a number', int: 'a whole number', bool: 'true or false',
+                                  str: 'a text', types.NoneType: 'null'}
 # Hints of a value of any kind.
 ANY_VALUE = (object, Any)
+Model = TypeVar('Model', covariant=True)
 
 
-class ModelRegistry:
+class ModelRegistry(Generic[Model]):
     """
     The classes of one kind that a game may name.
 
@@ -46,7 +47,7 @@ class ModelRegistry:
     :param left_out: where an option that is None comes from
     """
 
-    def __init__(self, group: str, kind: str, built_in: Mapping[str, str], base: type,
+    def __init__(self, group: str, kind: str, built_in: Mapping[str, str], base: type[Model],
                  document: str = '', given: tuple[str, ...] = (),
                  left_out: str = 'none') -> None:
         self.entry_point_group = f'crgame_ros.{group}'
@@ -62,7 +63,7 @@ class ModelRegistry:
         return (*self.built_in, *sorted(others - self.built_in.keys()))
 
     def create(self, name: str, options: Mapping[str, object] | None = None, where: str = '',
-               **given: object) -> Any:
+               **given: object) -> Model:
         """
         Create an object of a named class.
 
@@ -90,7 +91,7 @@ class ModelRegistry:
             raise InputError(f'cannot be made ({type(error).__name__}: {error})', label,
                              'check its options') from error
 
-    def find(self, name: str, where: str = '') -> type[Any]:
+    def find(self, name: str, where: str = '') -> type[Model]:
         """
         Find a class.
 
@@ -267,7 +268,7 @@ def _checked(value: object, hint: object, key: str, where: str, allowed: str) ->
                      f'give {wanted}; allowed options are: {allowed}')
 
 
-def _name(hint: Any) -> str:
+def _name(hint: object) -> str:
     if get_origin(hint) is Literal:
         return ' or '.join(repr(value) for value in get_args(hint))
     return VALUE_WORDS.get(hint, getattr(hint, '__name__', str(hint)))

@@ -36,7 +36,7 @@ class _Loader(_FASTEST):
         for first, resolvers in _FASTEST.yaml_implicit_resolvers.items()}
 
 
-def _number(loader: Any, node: yaml.ScalarNode) -> float | int:
+def _number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> float | int:
     build = loader.construct_yaml_int if node.tag.endswith(':int') else loader.construct_yaml_float
     if len(node.value) > MAX_DIGITS:
         raise yaml.constructor.ConstructorError(
@@ -162,7 +162,7 @@ def _refuse_wild(text: str) -> None:
                                   f'{MAX_VALUES} values')
 
 
-def _refuse_tag(event: Any) -> None:
+def _refuse_tag(event: yaml.ScalarEvent | yaml.CollectionStartEvent) -> None:
     if event.tag not in (None, '!') and event.tag not in _PLAIN_TAGS:
         raise _refusal(event, f'the tag {event.tag[:60]!r} is not taken')
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 import time
-from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded import measure_log
@@ -15,11 +14,12 @@ from crgame_ros.driver.source import IdleDriver
 from crgame_ros.errors import InputError
 from crgame_ros.recording.progress import Progress
 from crgame_ros.recording.recorded_game import recorded_inputs, RecordedInputs
-from crgame_ros.recording.recorded_plans import plans_of_report
+from crgame_ros.recording.recorded_plans import plans_of_report, RunReport
 from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.recording.run_record import read_run_record, run_record_of, RunRecord
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.recording.timing_report import offline_outcome, timing_report
+from crgame_ros.simulation.contacts import ContactEntry
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import Setup
 import numpy as np
@@ -48,7 +48,7 @@ class Alternative:
 
     planner: str
     record: RunRecord
-    outcome: Mapping[str, Any]
+    outcome: RunReport
     criticality: Criticality
     human_differs_s: float | None
     others_differ_s: float | None
@@ -60,17 +60,16 @@ class Alternative:
         return self.record.log
 
     @property
-    def contacts(self) -> Sequence[Mapping[str, Any]] | None:
+    def contacts(self) -> Sequence[ContactEntry] | None:
         """Return the first contact of each pair as in `timing.json`; None if unknown."""
-        found: Sequence[Mapping[str, Any]] | None = self.outcome['contacts']
-        return found
+        return self.outcome['contacts']
 
     @property
     def state_hash(self) -> str | None:
         """Return the hash over all states of an offline run."""
         return None if self.result is None else self.result.state_hash
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the result as a JSON-compatible dictionary."""
         return {
             'planner': self.planner, 'state_hash': self.state_hash,
@@ -135,7 +134,7 @@ def _drive_trajectory(drive: Callable[..., OfflineResult], setup: Setup,
                  drivers={human: IdleDriver() for human in humans})
 
 
-def _compare(planner: str, record: RunRecord, outcome: Mapping[str, Any],
+def _compare(planner: str, record: RunRecord, outcome: RunReport,
              recorded: RunTrajectories, result: OfflineResult | None = None) -> Alternative:
     log, humans = record.log, len(recorded.game.humans)
     return Alternative(

@@ -78,26 +78,24 @@ def measure(values: argparse.Namespace) -> int:
 
 def _lines(measured: 'RunMeasures') -> Iterator[str]:
     from crgame_ros.analysis.criticality.criticality import EXPOSURES, MEASURES
-    found: dict[str, Any] = measured.criticality.as_dict()
-    limits = Thresholds(**found['thresholds'])
-    for (vehicle_id, vehicle), rules in zip(
-            found['vehicles'].items(), measured.rules, strict=True):
-        yield vehicle_id
-        near = {name: worst for name, worst in vehicle['worst'].items()
-                if MEASURES[name].matters(worst['value'])}
+    ids, limits = measured.criticality.ids, measured.criticality.thresholds
+    for vehicle, rules in zip(measured.criticality.report(), measured.rules, strict=True):
+        yield vehicle.vehicle_id
+        near = {name: worst for name, measure in MEASURES.items()
+                if (worst := vehicle.worst.get(name)) and measure.matters(worst.value)}
         for name, worst in near.items():
-            critical = limits.exceeded(name, worst['value'])
-            yield (f'  {name:<13}{worst["value"]:9.2f} {worst["unit"]:<6} {worst["of"]} at '
-                   f'{worst["time_s"]:.1f} s{CRITICAL if critical else ""}')
+            critical = limits.exceeded(name, worst.value)
+            yield (f'  {name:<13}{worst.value:9.2f} {MEASURES[name].unit:<6} {worst.other} at '
+                   f'{worst.time_s:.1f} s{CRITICAL if critical else ""}')
         if not near:
             yield '  no other was near'
         for name, exposure in EXPOSURES.items():
-            yield (f'  {name.removesuffix("_s"):<15}{vehicle["exposures"][name]["value"]:7.2f} '
+            yield (f'  {name.removesuffix("_s"):<15}{vehicle.exposures[name]:7.2f} '
                    f'{exposure.unit:<6} {exposure.told(limits).definition}')
-        for each in vehicle['crossings']:
-            yield (f'  pet          {each["pet_s"]:9.2f} s      {each["second"]} after '
-                   f'{each["first"]} at {each["entered_s"]:.1f} s'
-                   f'{CRITICAL if limits.exceeded("pet", each["pet_s"]) else ""}')
+        for each in vehicle.crossings:
+            yield (f'  pet          {each.pet_s:9.2f} s      {ids[each.second]} after '
+                   f'{ids[each.first]} at {each.entered_s:.1f} s'
+                   f'{CRITICAL if limits.exceeded("pet", each.pet_s) else ""}')
         yield from _rule_lines(rules)
 
 

@@ -2,19 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run in one line, and the AVs whose planners never drove; alike live, offline and replayed."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
 from crgame_ros.analysis.scores.vehicle import VehicleScores
-from crgame_ros.recording.recorded_plans import plans_of_report
+from crgame_ros.recording.recorded_plans import plans_of_report, RunReport
 from crgame_ros.timing.metrics import slowness
 
 # Exit code of a run in which no plan of some planner was driven.
 NO_PLANS = 3
 
 
-def tell_outcome(say: Callable[[str], object], outcome: Mapping[str, object],
+def tell_outcome(say: Callable[[str], object], outcome: RunReport,
                  criticality: Criticality | None, name: str = '',
                  scores: Sequence[VehicleScores] = ()) -> int:
     """
@@ -30,7 +29,7 @@ def tell_outcome(say: Callable[[str], object], outcome: Mapping[str, object],
     return NO_PLANS if failed else 0
 
 
-def outcome_line(outcome: Mapping[str, Any], criticality: Criticality | None = None,
+def outcome_line(outcome: RunReport, criticality: Criticality | None = None,
                  scores: Sequence[VehicleScores] = ()) -> str:
     """
     Return contacts, least TTC, driven plans, scores and the real-time ratio of a run.
@@ -57,7 +56,7 @@ def outcome_line(outcome: Mapping[str, Any], criticality: Criticality | None = N
     return ', '.join(parts)
 
 
-def undriven(outcome: Mapping[str, object]) -> list[str]:
+def undriven(outcome: RunReport) -> list[str]:
     """Return one line for each AV that drove none of its planner's plans, with the reason."""
     return [f'{av}: no plan of its planner was driven: {found.trouble}'
             for av, found in plans_of_report(outcome).items()

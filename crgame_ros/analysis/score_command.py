@@ -9,14 +9,19 @@ from functools import partial
 import json
 from pathlib import Path
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.library.lookup import find_scenario
 
 if TYPE_CHECKING:  # A command that needs no engine starts without it.
+    from crgame_ros.analysis.scores.nuplan import NuplanScore
     from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
-    from crgame_ros.analysis.scores.vehicle import PlannerScores
+    from crgame_ros.analysis.scores.solution_judge import SolutionScores
+    from crgame_ros.analysis.scores.trajectory_feasibility import TrajectoryFeasibility
+    from crgame_ros.analysis.scores.vehicle import GoalRecord, PlannerScores
+    from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.recorded_plans import PlanOutcome
 
 DESCRIPTION = """\
 Score the drivers of a run: CommonRoad's costs and checks, feasibility, nuPlan's closed-loop score,
@@ -64,17 +69,17 @@ def score(values: argparse.Namespace) -> int:
     found = _score_run(values) if values.run is not None else _score_file(values)
     if values.out is not None:
         _write(found, values.out)
-    told = [each.as_dict() for each in found]
     if values.json:
+        told = [each.as_dict() for each in found]
         print(json.dumps(told[0] if len(told) == 1 else told, indent=2, allow_nan=False))
     else:
-        print('\n'.join(line for each in told for line in _lines(each)))
+        print('\n'.join(line for each in found for line in _lines(each)))
         if values.out is not None:
             print(f'files are in {values.out}')
     return 0
 
 
-def _progress(what: str) -> Any:
+def _progress(what: str) -> 'Progress':
     from crgame_ros.recording.progress import Progress
     return Progress(partial(print, file=sys.stderr, flush=True), what)
 
@@ -141,103 +146,106 @@ def _write(found: 'list[PlannerScores]', out: Path) -> None:
                out / 'scores.json')
 
 
-def _lines(found: dict[str, Any]) -> Iterator[str]:
-    yield f'{found["scenario"]}, {found["checker"]}'
-    for vehicle in found['vehicles']:
-        planner = f', {vehicle["planner"]}' if vehicle['planner'] else ''
+def _lines(found: 'PlannerScores') -> Iterator[str]:
+    from crgame_ros.analysis.scores.commonroad_costs import checker_version
+    yield f'{found.scenario_id}, {checker_version()}'
+    for vehicle in found.vehicles:
+        assert vehicle.commonroad is not None and vehicle.goal is not None
+        planner = f', {vehicle.planner}' if vehicle.planner else ''
         yield ''
-        yield f'{vehicle["vehicle"]} ({vehicle["role"]}{planner})'
+        yield f'{vehicle.vehicle_id} ({vehicle.role}{planner})'
         yield from (f'  {name:<12} {text}' for name, text in (
-            *_nuplan(vehicle['nuplan']), *_commonroad(vehicle['commonroad']),
-            *_goal(vehicle['goal']), *_plans(vehicle['plans'])))
-        for remark in vehicle['remarks']:
+            *_nuplan(vehicle.nuplan), *_commonroad(vehicle.commonroad),
+            *_goal(vehicle.goal), *_plans(vehicle.plans)))
+        for remark in vehicle.remarks:
             yield f'  note: {remark}'
     yield ''
-    for remark in found['remarks']:
+    for remark in found.remarks:
         yield f'note: {remark}'
 
 
-def _nuplan(found: dict[str, Any] | None) -> Iterator[tuple[str, str]]:
+def _nuplan(found: 'NuplanScore | None') -> Iterator[tuple[str, str]]:
+    from crgame_ros.analysis.scores.nuplan import BOUNDS, WEIGHTS
     if found is None:
         return
     factors = ' x '.join(f'{name.replace("_", " ")} {_number(value)}'
-                         for name, value in found['multipliers'].items())
-    mean = ', '.join(f'{name.replace("_", " ")} {_number(entry["value"])} (x{entry["weight"]:g})'
-                     for name, entry in found['weighted'].items())
-    yield 'nuPlan', f'{found["score"]:.3f} of 1'
+                         for name, value in found.multipliers.items())
+    mean = ', '.join(f'{name.replace("_", " ")} {_number(value)} (x{WEIGHTS[name]:g})'
+                     for name, value in found.weighted.items())
+    yield 'nuPlan', f'{found.score:.3f} of 1'
     yield '', f'= {factors}'
     yield '', f'x mean of {mean}'
-    yield '', (f'progress {found["progress_m"]:.0f} m, {found["expert"]}: '
-               f'{found["expert_progress_m"]:.0f} m')
-    for each in found['collisions']:
-        fault = 'at fault' if each['at_fault'] else 'not at fault'
-        yield '', (f'collision with {each["with"]} at {each["time_s"]:.1f} s: {each["kind"]}, '
+    yield '', f'progress {found.own_progress:.0f} m, {found.expert}: {found.expert_progress:.0f} m'
+    for each in found.collisions:
+        fault = 'at fault' if each.at_fault else 'not at fault'
+        yield '', (f'collision with {each.other_id} at {each.time_s:.1f} s: {each.kind}, '
                    f'{fault}')
-    beyond = [f'{name.replace("_", " ")} {entry["lowest"]:.2f} to {entry["highest"]:.2f} '
-              f'{entry["unit"]}' for name, entry in found['comfort'].items()
-              if not entry['comfortable']]
+    comfort = found.comfort
+    beyond = [f'{name.replace("_", " ")} {comfort.lowest[name]:.2f} to '
+              f'{comfort.highest[name]:.2f} {BOUNDS[name].unit}' for name in comfort.exceeded]
     if beyond:
         yield '', f'not comfortable: {"; ".join(beyond)}'
-    for remark in found['remarks']:
+    for remark in found.remarks:
         yield '', f'note: {remark}'
 
 
-def _commonroad(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    yield 'CommonRoad', (f'{"valid" if found["valid"] else "not valid"} as {found["vehicle"]}, '
-                         f'problem {found["planning_problem"]}, {found["states"]} states')
-    for name, reason in found['failed'].items():
+def _commonroad(found: 'SolutionScores') -> Iterator[tuple[str, str]]:
+    valid, solved = 'valid' if found.checks.is_valid else 'not valid', found.solved
+    yield 'CommonRoad', (f'{valid} as {solved.vehicle_id}, problem {solved.planning_problem_id}, '
+                         f'{len(solved.trajectory.state_list)} states')
+    for name, reason in found.checks.failed.items():
         yield '', f'{name}: {reason}'
-    costs = {name: entry for name, entry in found['costs'].items() if entry['total'] is not None}
+    costs = [f'{cost.name} {cost.total:.4g}' for cost in found.costs if cost.total is not None]
     if costs:
-        yield '', '  '.join(f'{name} {entry["total"]:.4g}' for name, entry in costs.items())
+        yield '', '  '.join(costs)
     reasons: dict[str, list[str]] = {}
-    for name, entry in found['costs'].items():
-        if entry['total'] is None:
-            reasons.setdefault(entry['reason'], []).append(name)
+    for cost in found.costs:
+        if cost.total is None:
+            reasons.setdefault(cost.reason, []).append(cost.name)
     for reason, names in reasons.items():
         yield '', f'no {", ".join(names)}: {reason}'
-    yield 'feasibility', _feasibility(found['feasibility'])
+    yield 'feasibility', _feasibility(found.feasibility)
 
 
-def _feasibility(found: dict[str, object]) -> str:
-    if found['feasible'] is None:
-        return f'unknown: {found["reason"]}'
-    if found['feasible']:
-        return f'feasible, {found["transitions"]} transitions'
-    return (f'not from time step {found["first_step"]} on, {found["infeasible"]} of '
-            f'{found["transitions"]} transitions: {found["reason"]}')
+def _feasibility(found: 'TrajectoryFeasibility') -> str:
+    if found.feasible is None:
+        return f'unknown: {found.reason}'
+    if found.feasible:
+        return f'feasible, {found.transitions} transitions'
+    return (f'not from time step {found.first_step} on, {found.infeasible} of '
+            f'{found.transitions} transitions: {found.reason}')
 
 
-def _goal(found: dict[str, object]) -> Iterator[tuple[str, str]]:
-    if found['reached_s'] is not None:
-        yield 'goal', f'reached after {found["reached_s"]:.1f} s'
-    elif found['last_distance_m'] is not None:
-        yield 'goal', (f'not reached, {found["last_distance_m"]:.1f} m away at the end '
-                       f'({found["least_distance_m"]:.1f} m at best)')
+def _goal(found: 'GoalRecord') -> Iterator[tuple[str, str]]:
+    if found.reached_s is not None:
+        yield 'goal', f'reached after {found.reached_s:.1f} s'
+    elif found.last_distance is not None:
+        yield 'goal', (f'not reached, {found.last_distance:.1f} m away at the end '
+                       f'({found.least_distance:.1f} m at best)')
     else:
         yield 'goal', 'not reached'
 
 
-def _plans(found: dict[str, Any] | None) -> Iterator[tuple[str, str]]:
+def _plans(found: 'PlanOutcome | None') -> Iterator[tuple[str, str]]:
     if found is None:
         return
-    if found['accepted_share'] is None:
+    if found.accepted_share is None:
         yield 'plans', 'not recorded'
         return
-    yield 'plans', (f'{100.0 * found["accepted_share"]:.1f} % accepted and no fallback, of '
-                    f'{_number(found["plans"])}; '
-                    f'{_number(found["fallback"])} fallbacks, {_number(found["refused"])} '
-                    f'refused, {_number(found["steps_without_plan"])} steps without a plan')
-    for reason, count in (found['fallback_reasons'] or {}).items():
+    yield 'plans', (f'{100.0 * found.accepted_share:.1f} % accepted and no fallback, of '
+                    f'{_number(found.plans)}; '
+                    f'{_number(found.fallback)} fallbacks, {_number(found.refused)} '
+                    f'refused, {_number(found.steps_without_plan)} steps without a plan')
+    for reason, count in (found.fallback_reasons or {}).items():
         yield '', f'{count} x {reason}'
-    for name in ('latency_ms', 'age_ms', 'plan_time_ms'):
-        if found[name] is not None:
-            yield '', (f'{name.removesuffix("_ms").replace("_", " ")} '
-                       f'{found[name]["p50"]:.0f} ms, at worst {found[name]["max"]:.0f} ms')
-    if found['worst_tracking_errors']:
+    for name, spread in (('latency', found.latency_ms), ('age', found.age_ms),
+                         ('plan time', found.plan_time_ms)):
+        if spread is not None:
+            yield '', f'{name} {spread["p50"]:.0f} ms, at worst {spread["max"]:.0f} ms'
+    if found.worst_tracking_errors:
         yield 'tracking', 'at worst ' + ', '.join(
             f'{name} {value:.2f} {_TRACKING_UNITS.get(name, "")}'
-            for name, value in found['worst_tracking_errors'].items())
+            for name, value in found.worst_tracking_errors.items())
 
 
 _TRACKING_UNITS = {'lateral': 'm', 'along': 'm', 'heading': 'rad', 'speed': 'm/s', 'lane': 'm'}

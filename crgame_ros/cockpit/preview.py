@@ -8,7 +8,6 @@ from dataclasses import replace
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.cockpit.job_process import serve_jobs
 from crgame_ros.cockpit.scene import scene_document
@@ -157,14 +156,13 @@ def _choice(chosen: Mapping[str, str], vehicle: str, own: str, allowed: list[str
     return value
 
 
-def _refuse_strangers(chosen: Mapping[str, object],
-                      specs: list[HumanSpec] | list[AvSpec]) -> None:
+def _refuse_strangers(chosen: Mapping[str, object], specs: list[HumanSpec] | list[AvSpec]) -> None:
     if not chosen.keys() <= {spec.id for spec in specs}:
         raise InputError('names a vehicle that the game does not have', 'choice',
                          'load the page again')
 
 
-def _without_nan(rows: list[list[Any]]) -> list[list[float | None]]:
+def _without_nan(rows: list[list[float | None]]) -> list[list[float | None]]:
     return [[None if value is None or math.isnan(value) else value for value in row]
             for row in rows]
 

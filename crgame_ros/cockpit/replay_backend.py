@@ -8,7 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 import json
 from pathlib import Path
-from typing import Any, Literal, TYPE_CHECKING
+from typing import Literal, TYPE_CHECKING, TypeVar
 
 from aiohttp import web
 from crgame_ros.analysis.criticality.criticality import Criticality
@@ -31,6 +31,8 @@ from crgame_ros.scenario.loading import parse_scenario
 if TYPE_CHECKING:
     from crgame_ros.cockpit.client import Client
     from crgame_ros.cockpit.hub import Hub
+
+T = TypeVar('T')
 
 
 def recorded_criticality(reader: BagReader, run: Epoch) -> bytes | None:
@@ -276,8 +278,8 @@ class ReplayBackend:
                 self._measured[epoch] = data
         return web.Response(body=self._measured[epoch], content_type='application/octet-stream')
 
-    async def _read(self, what: Callable[..., object], *arguments: object,
-                    thread: ThreadPoolExecutor | None | Literal['own'] = 'own') -> Any:
+    async def _read(self, what: Callable[..., T], *arguments: object,
+                    thread: ThreadPoolExecutor | None | Literal['own'] = 'own') -> T:
         try:
             return await asyncio.get_running_loop().run_in_executor(
                 self._thread if thread == 'own' else thread, what, *arguments)

@@ -167,9 +167,9 @@ class TrackCollector:
     def _add_status(self, status: object, n: int) -> None:
         taken = read_status(status)
         self._status.add(taken, n * self._scheduler.dt_s)
-        content = self._status.document()
-        for av, entry in content['planners'].items():
+        for av, entry in self._status.planners.items():
             entry['planner'] = entry['planner'] or self._planners.get(av, '')
+        content = self._status.document()
         for part in _STATUS_PARTS:
             if content[part]:
                 self._put(part, n, content[part])

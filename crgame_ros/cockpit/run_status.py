@@ -5,12 +5,15 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
-from typing import Any
+from typing import TypedDict
 
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.messages.status_values import BRAKING, Status, status_truth
 
 OK, ERROR = 0, 2
+Violation = TypedDict('Violation', {'vehicle': str, 'with': str, 't': float}, total=False)
+Verdict = TypedDict('Verdict', {  # noqa: UP013
+    'collision': bool, 'off_road': bool, 'hit': list[str]}, total=False)
 # Late traffic is reported at each late tick, and its end is never reported [s].
 LATE_TRAFFIC_S = 2.0
 # A stopped vehicle that touches the same object again within this time has one contact [s].
@@ -73,12 +76,12 @@ class RunStatus:
         self.countdown_s = 0
         self.timing: dict[str, object] | None = None
         self.planners: dict[str, dict[str, object]] = {}
-        self.drivability: dict[str, dict[str, Any]] = {}
+        self.drivability: dict[str, Verdict] = {}
         self.criticality: dict[str, dict[str, object]] = {}
         self.seats_lost = {}
         self.devices = {}
-        self.contacts: list[dict[str, Any]] = []
-        self.departures: list[dict[str, Any]] = []
+        self.contacts: list[Violation] = []
+        self.departures: list[Violation] = []
         self._stops: dict[FiredEvent, float] = {}
         self._traffic_late_t = -math.inf
         self._calm()
@@ -160,7 +163,7 @@ class RunStatus:
             self.run, self.reason = 'ended', 'silence'
             self._calm()
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, object]:
         """Return the part of the status document about the run's health."""
         over = self.run == 'ended'
         return {'run': self.run, 'reason': self.reason, 'stays': self.stays,
@@ -215,8 +218,7 @@ class RunStatus:
         self.timing['frame_skipping'] = skipping
         self._alarm('late', 'simulation', skipping, 'late: frames are skipped', t)
 
-    def _add_recording(self, level: int, text: str, values: Mapping[str, str],
-                       t: float) -> None:
+    def _add_recording(self, level: int, text: str, values: Mapping[str, str], t: float) -> None:
         failed = level == ERROR
         megabytes = (_number(values.get('bytes')) or 0.0) / 1e6
         self.recording = {
@@ -230,14 +232,13 @@ class RunStatus:
         off_road = values.get('road_compliance') == 'false'
         hit = [item for item in values.get('hit', '').split(',') if item]
         self._note_violations(vehicle, hit, off_road, t)
-        verdict = {'collision': collision, 'off_road': off_road, 'hit': hit}
+        verdict: Verdict = {'collision': collision, 'off_road': off_road, 'hit': hit}
         self.verdicts += verdict != self.drivability.get(vehicle)
         self.drivability[vehicle] = verdict
         self._alarm('collision', vehicle, collision, 'collision with ' + ', '.join(hit), t)
         self._alarm('off_road', vehicle, off_road, 'off the road', t)
 
-    def _note_violations(self, vehicle: str, hit: Sequence[str], off_road: bool,
-                         t: float) -> None:
+    def _note_violations(self, vehicle: str, hit: Sequence[str], off_road: bool, t: float) -> None:
         """Record the violations of a verdict that the one before did not have."""
         for other in hit:
             # Both of two driven vehicles report their contact.
@@ -249,8 +250,7 @@ class RunStatus:
 
     def _hit(self, vehicle: str) -> Sequence[str]:
         """Return the objects that the last verdict on a vehicle names."""
-        hit: Sequence[str] = self.drivability.get(vehicle, {}).get('hit', ())
-        return hit
+        return self.drivability.get(vehicle, {}).get('hit', ())
 
     def _was_stopped(self, vehicle: str, other: str, t: float) -> bool:
         """Return whether one of two vehicles has just been stopped by a contact with the other."""

@@ -61,8 +61,7 @@ def simplified(vertices: Points) -> Points:
     :return: the vertices that are left, including the first and the last
     """
     points = np.asarray(vertices, dtype=np.float64)
-    kept = shapely.get_coordinates(
-        shapely.simplify(shapely.LineString(points[:, :2]), TOLERANCE))
+    kept = shapely.get_coordinates(shapely.simplify(shapely.LineString(points[:, :2]), TOLERANCE))
     if points.shape[1] < 3:
         return kept
     steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
@@ -249,8 +248,7 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
         'contact': game.drivability.contact,
         'tasks': [_task(task, game.tasks) for task in game.tasks], 'language': game.language,
         'gaze': list(game.gaze_seats)}
-    finite: Document = _finite(document)
-    return finite
+    return {name: _finite(value) for name, value in document.items()}
 
 
 def _task(spec: TaskSpec, tasks: Sequence[TaskSpec]) -> Document:
@@ -328,7 +326,7 @@ def _bounds(network: LaneletNetwork, game: GameDocument) -> list[float]:
     return flat(np.array([together.min(axis=0), together.max(axis=0)]))
 
 
-def _finite(value: object) -> Any:
+def _finite(value: object) -> object:
     """Replace NaN and infinities, which JSON does not have, by null."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None

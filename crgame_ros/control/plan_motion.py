@@ -3,11 +3,11 @@
 """A plan as one continuous motion, and the motion of a vehicle that joins it late."""
 
 import math
-from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import interpolate_angle, wrap_pi, wrap_pi_array
 from crgame_ros.geometry.reference_point import joined
+from crgame_ros.vehicle.idm_model import Number
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import PLANNED_REST, StateColumn, VehicleState
 import numpy as np
@@ -132,7 +132,8 @@ class PlanMotion:
         return np.asarray(sampled)
 
 
-def _cubic(share: Any, first: object, second: Any, start: Any, end: object) -> Any:
+def _cubic(share: Number, first: Number, second: Number, start: Number,
+           end: Number) -> tuple[Number, Number]:
     """Return the cubic Hermite polynomial between two values with given slopes, and its slope."""
     rest, step = 1.0 - share, second - first
     return (first + share * share * (3.0 - 2.0 * share) * step
@@ -208,8 +209,7 @@ class JoinedMotion:
         bend = ((curvature + beyond) * inner / math.cos(turn) - curvature) \
             * inner / math.cos(turn) ** 2 - curvature * slope * math.tan(turn)
         for across_s in ACROSS_TIMES_S:
-            states = self._across(speeds, ways, across_s * max(speed, SLOW),
-                                  (offset, slope, bend))
+            states = self._across(speeds, ways, across_s * max(speed, SLOW), (offset, slope, bend))
             if self._can_steer(states):
                 states[0] = vehicle
                 return states

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
 import re
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import AxisBinding, ControlBindings, GearButtons, LightButtons
@@ -88,10 +88,11 @@ class Code(Special):
     def __init__(self, prefix: str) -> None:
         self._prefix = prefix
 
-    def read(self, given: Any, where: str, key: str, base: Path) -> int:
+    def read(self, given: object, where: str, key: str, base: Path) -> int:
         """Return the number of a named code."""
-        code = ecodes.ecodes.get(given) if isinstance(given, str) else None
-        if code is None or not given.startswith(self._prefix):
+        code = ecodes.ecodes.get(given) if isinstance(given, str) \
+            and given.startswith(self._prefix) else None
+        if code is None:
             raise InputError(f'"{key}" is {given!r:.80}', where, f'give {self}')
         return int(code)
 

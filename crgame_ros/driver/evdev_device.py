@@ -194,8 +194,8 @@ class EvdevDevice:
         return self.device_map.force if self._can_push and self.device_map else None
 
     @property
-    def force_device(self) -> Any:
-        """Return the interface to its motor (`ForceDevice`); None without one."""
+    def force_device(self) -> 'InputDevice[str] | None':
+        """Return the interface to its motor; None without one."""
         return self._device if self._can_push else None
 
     def poll(self, now_s: float) -> bool:

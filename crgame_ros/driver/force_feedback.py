@@ -342,12 +342,12 @@ class ForceFeedback:
         elif self._effect is None or self._effect.device is not device:
             self._effect = None
             if now_s >= self._retry_s:
-                self._begin(limits, now_s)
+                self._begin(device, limits, now_s)
         return self._effect
 
-    def _begin(self, limits: ForceLimits, now_s: float) -> None:
+    def _begin(self, device: ForceDevice, limits: ForceLimits, now_s: float) -> None:
         try:
-            self._effect = ForceEffect(self._device.force_device)
+            self._effect = ForceEffect(device)
         except OSError as error:
             self._lose(error, now_s)
             return

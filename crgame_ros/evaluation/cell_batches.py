@@ -8,13 +8,14 @@ from itertools import groupby, islice
 import json
 import math
 import time
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.evaluation.cell import Cell, Condition
 from crgame_ros.evaluation.cell_process import compute, Limits, packed_content
 from crgame_ros.evaluation.content import ContentStore
-from distributed import as_completed
+from crgame_ros.evaluation.results.cell_rows import CellRows
+from distributed import as_completed, Client, Future
 from distributed.scheduler import KilledWorker
 
 # Batches submitted per computing thread: one that it computes, and one that follows.
@@ -66,7 +67,7 @@ class CellBatches:
     :param number: their number.
     """
 
-    def __init__(self, client: Any, store: ContentStore, limits: Limits, cells: Iterator[Cell],
+    def __init__(self, client: Client, store: ContentStore, limits: Limits, cells: Iterator[Cell],
                  number: int) -> None:
         self._client, self._store, self._limits = client, store, limits
         self._cells, self._unsent = cells, number
@@ -75,14 +76,14 @@ class CellBatches:
         self._again: deque[Batch] = deque()
         self._out: dict[object, Batch] = {}
         # Contents of the batches in computation, and the number of these batches for each.
-        self._contents: dict[str, Any] = {}
+        self._contents: dict[str, Future] = {}
         self._uses: Counter[str] = Counter()
         self._threads, self._counted_s = 0, -math.inf
         # Wall time of a cell in the batch that ended last; infinite before the first [s].
         self._cell_s = math.inf
         self._ended = as_completed(loop=client.loop)
 
-    def results(self) -> Iterator[list[tuple[Cell, dict[str, object]]]]:
+    def results(self) -> Iterator[list[tuple[Cell, CellRows]]]:
         """
         Compute the cells.
 
@@ -145,7 +146,7 @@ class CellBatches:
     def _next_cell(self) -> Cell | None:
         return self._left.popleft() if self._left else next(self._cells, None)
 
-    def _content(self, digest: str) -> object:
+    def _content(self, digest: str) -> Future:
         if digest not in self._contents:
             self._contents[digest] = self._client.submit(
                 packed_content, self._store.packed(digest), key=f'content-{digest}')
@@ -158,7 +159,7 @@ class CellBatches:
                 del self._uses[digest]
                 self._contents.pop(digest).release()
 
-    def _rows(self, future: Any, batch: Batch) -> list[tuple[Cell, dict[str, Any]]]:
+    def _rows(self, future: Future, batch: Batch) -> list[tuple[Cell, CellRows]]:
         """
         Return the rows of a batch that has ended; keep the cells without rows to be sent again.
 
@@ -168,7 +169,7 @@ class CellBatches:
             raise CrgameError('the scheduler is gone; what was finished is kept: the same command '
                               'goes on')
         if future.status == 'finished':
-            rows = [json.loads(text) for text in future.result()]
+            rows: list[CellRows] = [json.loads(text) for text in future.result()]
             left = batch.cells[len(rows):]
             self._left.extend(left)
             self._unsent += len(left)
@@ -183,7 +184,7 @@ class CellBatches:
             raise error
         raise CrgameError(f'a worker cannot compute ({type(error).__name__}: {error})')
 
-    def _ended_without(self, batch: Batch, reason: str) -> list[tuple[Cell, dict[str, object]]]:
+    def _ended_without(self, batch: Batch, reason: str) -> list[tuple[Cell, CellRows]]:
         """Send each cell again, alone, because one of them may be the cause; or give it up."""
         if batch.rounds < _ROUNDS:
             self._again.extend(Batch((cell,), batch.rounds + 1) for cell in batch.cells)

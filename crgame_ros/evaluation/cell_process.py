@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Computes cells in a separate process, so that a hang, excess memory or crash affects only it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 import json
 import os
@@ -17,11 +17,12 @@ import tempfile
 import threading
 import time
 import traceback
-from typing import Any, BinaryIO, NamedTuple, NoReturn
+from typing import BinaryIO, IO, NamedTuple, NoReturn
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.evaluation.cell import Cell, condition_of
 from crgame_ros.evaluation.content import ContentStore
+from crgame_ros.evaluation.results.cell_rows import CellRows
 from crgame_ros.evaluation.source_digest import engine_digest
 from distributed import get_worker
 
@@ -49,7 +50,7 @@ class CellProcess:
         self._process: subprocess.Popen[bytes] | None = None
         self._errors: BinaryIO | None = None
 
-    def compute(self, cell: str, timeout_s: float) -> dict[str, Any]:
+    def compute(self, cell: str, timeout_s: float) -> CellRows:
         """
         Compute a cell.
 
@@ -60,13 +61,13 @@ class CellProcess:
         """
         start_s = time.perf_counter()
         rows = self._once(cell, timeout_s)
-        if rows['cell']['status'] == 'died' and signal.SIGKILL.name in rows['cell']['reason']:
+        if rows['cell']['status'] == 'died' and signal.SIGKILL.name in str(rows['cell']['reason']):
             # Another process killed it: the cell may not be the cause.
             rows = self._once(cell, timeout_s)
         rows.setdefault('work', {})['wall_s'] = time.perf_counter() - start_s
         return rows
 
-    def _once(self, cell: str, timeout_s: float) -> dict[str, Any]:
+    def _once(self, cell: str, timeout_s: float) -> CellRows:
         process = self._started()
         assert process.stdin is not None and process.stdout is not None
         try:
@@ -82,7 +83,7 @@ class CellProcess:
             if rows['cell']['status'] == 'memory':
                 # The remaining memory is fragmented.
                 self.close()
-        return dict(rows)
+        return rows
 
     def close(self) -> None:
         """End the process."""
@@ -110,7 +111,7 @@ class CellProcess:
                 _read(self._process.stdout, _STARTS_S)
         return self._process
 
-    def _dead(self, process: 'subprocess.Popen[bytes]') -> dict[str, object]:
+    def _dead(self, process: 'subprocess.Popen[bytes]') -> CellRows:
         try:
             code = process.wait(_ENDS_S)
         except subprocess.TimeoutExpired:
@@ -128,16 +129,16 @@ class CellProcess:
         return _failed('died', f'its process ended with {how}', said)
 
 
-def _failed(status: str, reason: str, trace: str = '') -> dict[str, object]:
+def _failed(status: str, reason: str, trace: str = '') -> CellRows:
     return {'cell': {'status': status, 'reason': reason, 'traceback': trace}, 'vehicles': []}
 
 
-def _write(stream: Any, data: bytes) -> None:
+def _write(stream: IO[bytes], data: bytes) -> None:
     stream.write(_LENGTH.pack(len(data)) + data)
     stream.flush()
 
 
-def _read(stream: Any, timeout_s: float) -> bytes:
+def _read(stream: IO[bytes] | IO[str], timeout_s: float) -> bytes:
     """
     Read a message.
 
@@ -158,7 +159,7 @@ def _read(stream: Any, timeout_s: float) -> bytes:
     return data[_LENGTH.size:]
 
 
-def _messages() -> Any:
+def _messages() -> Iterator[str]:
     """Yield the texts of cells; end the process at once when the parent is gone."""
     waiting: list[str] = []
     there = threading.Semaphore(0)
@@ -202,8 +203,7 @@ def packed_content(packed: Mapping[str, bytes]) -> Mapping[str, bytes]:
     return packed
 
 
-def compute(batch: str, contents: Mapping[str, Mapping[str, bytes]],
-            limits: Limits) -> list[str]:
+def compute(batch: str, contents: Mapping[str, Mapping[str, bytes]], limits: Limits) -> list[str]:
     """
     Compute a batch of cells in the process of this worker's thread, one after the other.
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import re
 import resource
 import time
-from typing import Any
+from typing import Any, Literal, TypeVar
 
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.driver.source import ReplayDriver
@@ -15,7 +15,7 @@ from crgame_ros.each_minute import kind_of
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_scene import INPUTS
 from crgame_ros.evaluation.content import resolved
-from crgame_ros.evaluation.results.cell_rows import outcome_of, vehicle_rows
+from crgame_ros.evaluation.results.cell_rows import CellRows, outcome_of, vehicle_rows
 from crgame_ros.game.game import Game, parse_game
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
@@ -28,6 +28,7 @@ from crgame_ros.simulation.offline import OfflineResult, PlannerRecord, run_offl
 from crgame_ros.simulation.setup import build_setup, Setup
 import numpy as np
 
+T = TypeVar('T')
 # A planner's reason begins with the name of an exception if its code failed.
 _CODE_FAILED = re.compile(r'(setup failed: )?(\w*(Error|Exception|Interrupt|Iteration))\b')
 
@@ -65,8 +66,8 @@ def _adapted(game: Game, loaded: LoadedScenario, cell: Cell, contents: Path) -> 
     choice: dict[str, Any] = {'planner': OWN, 'options': None} \
         if given.planner_choice is None else _resolved(given.planner_choice, contents)
 
-    def spec(kind: type[object], values: object, name: str) -> Any:
-        return values if values is None or values == OWN else read(
+    def spec(kind: type[T], values: object, name: str) -> T | Literal['own'] | None:
+        return None if values is None else OWN if values == OWN else read(
             kind, _resolved(values, contents), name, contents)
     return adapt_game(
         game, loaded, seed=cell.seed, planner=choice['planner'], options=choice['options'],
@@ -74,7 +75,7 @@ def _adapted(game: Game, loaded: LoadedScenario, cell: Cell, contents: Path) -> 
         traffic=spec(TrafficSpec, given.traffic_values, 'traffic'))
 
 
-def _resolved(value: Any, contents: Path) -> Any:
+def _resolved(value: object, contents: Path) -> Any:
     if isinstance(value, Mapping):
         return {name: _resolved(item, contents) for name, item in value.items()}
     if isinstance(value, list):
@@ -99,7 +100,7 @@ def measured(cell: Cell, result: OfflineResult) -> Run:
     return run
 
 
-def compute_cell(cell: Cell, contents: Path) -> dict[str, object]:
+def compute_cell(cell: Cell, contents: Path) -> CellRows:
     """
     Run and measure a cell.
 

@@ -208,8 +208,7 @@ def values_of_game(game: Game, store: ContentStore,
     scenario = Content('scenario.xml', {'scenario.xml': guard.encode(loaded.xml_text)})
     store.put(scenario)
     values['scenario'] = scenario.reference
-    found: dict[str, object] = with_contents(values, store)
-    return found
+    return with_contents(values, store)
 
 
 def with_contents(value: object, store: ContentStore, key: str = '') -> Any:

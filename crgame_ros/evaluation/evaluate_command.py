@@ -9,7 +9,7 @@ from functools import partial
 import json
 from pathlib import Path
 import sys
-from typing import Any, get_args, TYPE_CHECKING
+from typing import get_args, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.file_names import GRID_FILE, REPORTS, SEARCH_FILE
@@ -190,8 +190,9 @@ def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
     base = values.plan.parent
     read = read_yaml(values.plan, 'plan')
     if isinstance(read, dict):
-        here = {key: [_from_here(key, name) for name in given[key]]
-                for key in ('games', 'scenarios', 'humans') if key in given}
+        here = {key: [_from_here(key, name) for name in names]
+                for key in ('games', 'scenarios', 'humans')
+                if isinstance(names := given.get(key), list)}
         read = read | given | here
     return parse_plan(read, str(values.plan), base), \
         values.out or Path('evaluations') / values.plan.stem
@@ -204,7 +205,7 @@ def _from_here(key: str, name: str) -> str:
     return str(Path(name).expanduser().resolve())
 
 
-def _given(values: argparse.Namespace) -> dict[str, Any]:
+def _given(values: argparse.Namespace) -> dict[str, object]:
     """Return the values of a plan that the command line gives."""
     given: dict[str, object] = {
         name: getattr(values, name) for name in ('games', 'scenarios', 'humans')

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_grid import CellGrid, make_grid
@@ -14,7 +13,7 @@ from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.dask_cluster import check_workers, dask_client
 from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.evaluation.plan import EvaluationPlan
-from crgame_ros.evaluation.results.cell_rows import CELLS
+from crgame_ros.evaluation.results.cell_rows import CellRows
 from crgame_ros.evaluation.results.parts import PART_CELLS, ResultParts
 
 GIGABYTE = 1_000_000_000
@@ -132,13 +131,13 @@ def _compute(grid: CellGrid, finished: set[bytes], parts: ResultParts, store: Co
                 told(tally, cell, row['cell'])
 
 
-def rows_of(cell: Cell, found: dict[str, Any]) -> dict[str, Any]:
+def rows_of(cell: Cell, found: CellRows) -> CellRows:
     """
     Return the rows of a cell with all columns that identify it.
 
     :param found: its rows, as `cell_run.compute_cell` returns them.
     """
     own = {'cell': cell.key, **cell.factors}
-    return {CELLS.name.removesuffix('s'): own | found['cell'],
+    return {'cell': own | found['cell'],
             'vehicles': [vehicle | own for vehicle in found['vehicles']],
             'work': {'cell': cell.key, **found['work']}}

@@ -92,8 +92,7 @@ class EvaluationFolder:
 
         :raises InputError: if the folder holds no evaluation.
         """
-        values: dict[str, object] = self._note()['plan']
-        return values
+        return self._note()['plan']
 
     @property
     def base(self) -> Path:

@@ -5,7 +5,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, TypeVar
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.perception_spec import PerceptionSpec
@@ -19,6 +19,7 @@ from crgame_ros.yaml_text import read_yaml
 
 MOST_SEEDS = 1_000_000
 _SEE = Form('see docs/evaluation.md for the keys')
+T = TypeVar('T')
 
 
 @dataclass(frozen=True)
@@ -133,9 +134,9 @@ class EvaluationPlan:
         return _choices(self.traffic, TrafficSpec, 'traffic', self.base)
 
 
-def _choices(given: Mapping[str, object], kind: type[object], what: str,
-             base: Path) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+def _choices(given: Mapping[str, object], kind: type[T], what: str,
+             base: Path) -> dict[str, T | str | None]:
+    found: dict[str, T | str | None] = {}
     for label, value in (given or {OWN: OWN}).items():
         where = f'{what}: {label}'
         if value is None or value == OWN:

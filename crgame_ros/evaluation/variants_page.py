@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 import json
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from crgame_ros.analysis.report.document import Article, Page
 from crgame_ros.analysis.report.section import free, number, plain, Section, table
@@ -24,7 +24,7 @@ from crgame_ros.whole_file import write_text
 Verdict = Literal['pass', 'failure', 'excused', 'unknown']
 _KEY = (('pass', 'kept'), ('failure', 'failure'), ('excused', 'no AV to blame'),
         ('unknown', 'could not be run'))
-Row = Mapping[str, Any]
+Row = Mapping[str, object]
 _GOALS = ('min_distance',)
 
 
@@ -161,7 +161,7 @@ def write_variant_pages(folder: Path, grid: CellGrid, goals: Sequence[str]) -> I
     :raises InputError: if a part is damaged, or a page cannot be written.
     """
     # The tables are read once for all games.
-    rows: dict[str, list[tuple[Row, Sequence[Row]]]] = {
+    rows: dict[object, list[tuple[Row, Sequence[Row]]]] = {
         scene.game: [] for scene in grid.scenes if scene.variants}
     for row, vehicles in stored_rows(folder):
         if row['game'] in rows:
@@ -179,8 +179,7 @@ def _write(folder: Path, grid: CellGrid, scene: CellScene,
     planners = [planner.label for planner in grid.planners]
     if len(planners) > 1:
         axes.append({'name': 'planner', 'values': planners})
-    points = [_point(row, vehicles, expectations, goals)
-              for row, vehicles in rows]
+    points = [_point(row, vehicles, expectations, goals) for row, vehicles in rows]
     failures = sum(point.verdict == 'failure' for point in points)
     view = VariantsView(
         f'{scene.label}: its variants',
@@ -194,10 +193,10 @@ def _write(folder: Path, grid: CellGrid, scene: CellScene,
 
 def _point(row: Row, vehicles: Sequence[Row], expectations: Sequence[Expectation],
            goals: Sequence[str]) -> VariantPoint:
-    variant = {**json.loads(row['variant'] or '{}'), 'planner': row['planner']}
+    variant = {**json.loads(str(row['variant'] or '{}')), 'planner': row['planner']}
     values = [worst_of(goal, vehicles, 1) for goal in goals]
     if row['status'] != 'ok':
-        return VariantPoint(row['cell'], variant, values, 'unknown', row['reason'] or '')
+        return VariantPoint(str(row['cell']), variant, values, 'unknown', str(row['reason'] or ''))
     broken = [line for each in expectations for line in shortfalls(each, vehicles)]
-    return VariantPoint(row['cell'], variant, values, 'failure' if broken else 'pass',
+    return VariantPoint(str(row['cell']), variant, values, 'failure' if broken else 'pass',
                         '; '.join(broken))

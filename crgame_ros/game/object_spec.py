@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, TextIO
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.geometry.angles import wrap_pi
@@ -53,7 +53,7 @@ def read_trajectory(name: str, base: Path, where: str) -> tuple[TrajectoryRow, .
         if path.stat().st_size > MAX_BYTES:
             raise InputError('is larger than 1 MiB', str(path), 'thin out the trajectory')
         with path.open(encoding='utf-8-sig', newline='') as file:
-            return _parse(csv.reader(file, strict=True), str(path))
+            return _parse(file, str(path))
     except (OSError, ValueError, RuntimeError) as error:
         reason = getattr(error, 'strerror', None) or str(error)
         raise InputError(f'cannot read the trajectory {short(name)} ({reason})', where,
@@ -62,7 +62,8 @@ def read_trajectory(name: str, base: Path, where: str) -> tuple[TrajectoryRow, .
         raise InputError(f'is no CSV ({error})', str(path), 'save it as CSV in UTF-8') from error
 
 
-def _parse(reader: Any, path: str) -> tuple[TrajectoryRow, ...]:
+def _parse(file: TextIO, path: str) -> tuple[TrajectoryRow, ...]:
+    reader = csv.reader(file, strict=True)
     header = tuple(cell.strip() for cell in next(reader, []))
     if header not in (_COLUMNS, _COLUMNS[:3]):
         raise InputError(f'its first line is {short(",".join(header))}', path,
@@ -295,8 +296,7 @@ class ObjectSpec:
     path: Annotated[tuple[Point, ...], Listed(2, 1000, 'way-point'), OnlyWith(('path',))] = ()
     trajectory: Annotated[tuple[TrajectoryRow, ...], Rows(), OnlyWith(('trajectory',))] = ()
     shift: Annotated[float, Within(-1e4, 1e4), OnlyWith(('trajectory',)), LeftOut()] = 0.0
-    speed_factor: Annotated[float, Within(0.1, 10.0), OnlyWith(('trajectory',)),
-                            LeftOut()] = 1.0
+    speed_factor: Annotated[float, Within(0.1, 10.0), OnlyWith(('trajectory',)), LeftOut()] = 1.0
     lanelet: Annotated[int | None, OnlyWith(('lanelet',)),
                        Advice('give the id of a lanelet')] = None
     s: Annotated[float, Within(0.0, MAX_COORDINATE), OnlyWith(('lanelet',))] = 0.0

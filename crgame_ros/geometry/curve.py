@@ -285,5 +285,4 @@ def nearest(points: FloatArray, samples: FloatArray) -> NDArray[np.intp]:
     dx *= dx
     dy *= dy
     dx += dy
-    rows: NDArray[np.intp] = dx.argmin(axis=1)
-    return rows
+    return dx.argmin(axis=1)

@@ -50,12 +50,10 @@ def placed(corners: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[
     yaw = poses[..., 2, None]
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y = corners[..., 0], corners[..., 1]
-    return joined(poses[..., 0, None] + cos * x - sin * y,
-                  poses[..., 1, None] + sin * x + cos * y)
+    return joined(poses[..., 0, None] + cos * x - sin * y, poses[..., 1, None] + sin * x + cos * y)
 
 
-def placed_at(corners: NDArray[np.float64], x: float, y: float,
-              yaw: float) -> NDArray[np.float64]:
+def placed_at(corners: NDArray[np.float64], x: float, y: float, yaw: float) -> NDArray[np.float64]:
     """Place corners (C, 2) at one pose of their centre: `placed` in a third of its time."""
     cos, sin = math.cos(yaw), math.sin(yaw)
     return np.asarray(corners @ np.array(((cos, sin), (-sin, cos))) + (x, y))
@@ -145,8 +143,7 @@ def _triangulate(shape: Shape) -> list[list[float]]:
     if polygon.area == 0.0:
         raise InputError(f'a polygon of {len(shape.vertices)} corners has no area', 'shape',
                          'give at least three corners that are not in one line')
-    corners: list[list[float]] = triangle_corners(polygon).reshape(-1, 6).tolist()
-    return corners
+    return triangle_corners(polygon).reshape(-1, 6).tolist()
 
 
 def touches(rectangle: Shape, poses: FloatArray, other: Shape,

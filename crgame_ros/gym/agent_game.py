@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.errors import InputError, PlanningError
@@ -177,7 +177,7 @@ class AgentGame:
         self.game.begin(seed, [] if self._criticality is None else [self._criticality], start,
                         difficulty)
 
-    def act(self, actions: Mapping[str, Any]) -> None:
+    def act(self, actions: Mapping[str, object]) -> None:
         """Advance to the next decision (`DrivingGame.act`)."""
         self.game.act(actions)
 
@@ -220,8 +220,7 @@ class AgentGame:
         scheduler = game.simulation.scheduler
         measures = None if self._criticality is None else next(
             tick for tick in self._criticality.latest if tick.subject == seat.row)
-        goal = self._goals[seat.id].is_met(
-            seat.state, scheduler.k(game.simulation.n))
+        goal = self._goals[seat.id].is_met(seat.state, scheduler.k(game.simulation.n))
         collision = bool(seat.hit)
         reward, terms = experiment.reward.compute(Decision(
             experiment.ticks * scheduler.time_step_s, seat.before[0], seat.state, seat.place,

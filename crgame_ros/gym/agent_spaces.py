@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The spaces of an agent, as Gymnasium's types."""
 
-from typing import Any
 
 from crgame_ros.policy.actions import action_bounds, ActionKind, MANOEUVRES
 from crgame_ros.policy.observation_spec import ObservationSpec
@@ -12,7 +11,7 @@ import numpy as np
 
 def observation_space(spec: ObservationSpec, kind: ActionKind) -> spaces.Dict:
     """Return the space of observations: a box for each part, and one of a mask of manoeuvres."""
-    boxes: dict[str, spaces.Space[Any]] = {
+    boxes: dict[str, spaces.Space[object]] = {
         part: spaces.Box(low, high, dtype=low.dtype.type)
         for part, (low, high) in spec.bounds().items()}
     if kind == 'manoeuvre':

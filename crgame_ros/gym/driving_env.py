@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A game for one agent, as Gymnasium's environment."""
 
-from typing import Any, ClassVar, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.gym.agent_game import AgentGame, Episodes, make_experiment
@@ -34,11 +34,9 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32] | np.int64]):
     :raises InputError: if a keyword is wrong.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        'render_modes': ['human', 'rgb_array'], 'render_fps': FRAMES_PER_S}
+    metadata = {'render_modes': ['human', 'rgb_array'], 'render_fps': FRAMES_PER_S}
 
-    def __init__(self, seat: str = 'av0', render_mode: str | None = None,
-                 **keywords: Any) -> None:
+    def __init__(self, seat: str = 'av0', render_mode: str | None = None, **keywords: Any) -> None:
         check_render_mode(render_mode, self.metadata['render_modes'])
         self.experiment = make_experiment((seat,), **keywords)
         self.render_mode = render_mode
@@ -57,7 +55,7 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32] | np.int64]):
         return self._episodes.agent
 
     def reset(self, *, seed: int | None = None,
-              options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
+              options: dict[str, object] | None = None) -> tuple[Seen, dict[str, object]]:
         """
         Begin an episode; equal seeds and equal actions give equal episodes.
 

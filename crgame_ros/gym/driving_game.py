@@ -284,7 +284,7 @@ class DrivingGame:
                 seat.overhang = self.road.overhang(
                     *state.center(vehicle.rear_to_center), state.yaw, vehicle.shape)
 
-    def act(self, actions: Mapping[str, Array]) -> None:
+    def act(self, actions: Mapping[str, object]) -> None:
         """
         Advance to the next decision.
 

@@ -3,7 +3,7 @@
 """Several games of one agent each in one process, as Gymnasium's vector environment."""
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.gym.agent_game import AgentGame, Episodes, make_experiment, observed_together
@@ -35,9 +35,8 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
     :raises InputError: if a keyword is wrong.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        'render_modes': ['rgb_array'], 'render_fps': FRAMES_PER_S,
-        'autoreset_mode': AutoresetMode.NEXT_STEP}
+    metadata = {'render_modes': ['rgb_array'], 'render_fps': FRAMES_PER_S,
+                'autoreset_mode': AutoresetMode.NEXT_STEP}
 
     def __init__(self, num_envs: int = 1, seat: str = 'av0', render_mode: str | None = None,
                  **keywords: Any) -> None:
@@ -57,7 +56,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         self._painters: dict[EpisodeSetups, ScenePainter] = {}
 
     def reset(self, *, seed: int | Sequence[int | None] | None = None,
-              options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, object]]:
+              options: dict[str, object] | None = None) -> tuple[Seen, dict[str, object]]:
         """
         Begin an episode in every game.
 

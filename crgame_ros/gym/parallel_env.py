@@ -37,13 +37,13 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
     :raises InputError: if a keyword is wrong.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: ClassVar[dict[str, object]] = {
         'name': 'crgame_v0', 'render_modes': ['rgb_array'], 'render_fps': FRAMES_PER_S,
         'is_parallelizable': True}
 
     def __init__(self, seats: Sequence[str] | None = None, render_mode: str | None = None,
                  **keywords: Any) -> None:
-        check_render_mode(render_mode, self.metadata['render_modes'])
+        check_render_mode(render_mode, ['rgb_array'])
         if seats is None:
             # Without seats of agents, a game has those of its file.
             seats = Episodes(make_experiment((), **keywords)).agent.setups.base.vehicle_ids
@@ -74,7 +74,7 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
     def _together(self) -> AgentGame:
         return self._episodes.agent
 
-    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None
+    def reset(self, seed: int | None = None, options: dict[str, object] | None = None
               ) -> tuple[dict[str, Seen], dict[str, dict[str, object]]]:
         """
         Begin an episode; equal seeds and equal actions give equal episodes.

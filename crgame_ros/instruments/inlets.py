@@ -14,7 +14,7 @@ import ctypes
 from dataclasses import replace
 import math
 import time
-from typing import Any
+from typing import Any, TYPE_CHECKING, TypeVar
 
 from crgame_ros.errors import one_line
 from crgame_ros.game.instruments_spec import InletSpec
@@ -29,6 +29,10 @@ from crgame_ros.messages.instrument_samples import (
 import numpy as np
 from numpy.typing import NDArray
 
+if TYPE_CHECKING:
+    from pylsl import StreamInfo, StreamInlet
+
+T = TypeVar('T')
 FloatArray = NDArray[np.float64]
 # A stream that no longer answers is gone after this time [s].
 FORGET_S = 5.0
@@ -47,7 +51,7 @@ class Inlet:
     :ivar described: whether names and units of its channels have come.
     """
 
-    def __init__(self, info: Any, number: int) -> None:
+    def __init__(self, info: 'StreamInfo', number: int) -> None:
         import pylsl
         self.uid: str = info.uid()
         count: int = info.channel_count()
@@ -63,8 +67,8 @@ class Inlet:
         self.offset_s, self.uncertainty_s = _UNKNOWN
         self._connection = 0
         self.described = False
-        self._inlet: Any = pylsl.StreamInlet(info, max_buflen=BUFFER_S, recover=True,
-                                             as_numpy=self.stream.format != 'string')
+        self._inlet = pylsl.StreamInlet(info, max_buflen=BUFFER_S, recover=True,
+                                        as_numpy=self.stream.format != 'string')
         _attempt(lambda: self._inlet.open_stream(0.0))
 
     def poll(self) -> list[Batch]:
@@ -190,7 +194,7 @@ class Inlets:
                     stream, channels=inlet.stream.channels, units=inlet.stream.units))
         return found
 
-    def _note(self, key: str, info: Any) -> None:
+    def _note(self, key: str, info: 'StreamInfo') -> None:
         """Note a stream that is there: a new one, one that is back, or as before."""
         stream, inlet = self._streams.get(key), self._inlets.get(key)
         if stream is None:
@@ -207,7 +211,7 @@ class Inlets:
         self._change(key, replace(stream, here=True, gaps=gaps))
         self._say(f'stream {_title(stream)} is back; gaps so far: {gaps}')
 
-    def _begin(self, key: str, info: Any) -> None:
+    def _begin(self, key: str, info: 'StreamInfo') -> None:
         if key in self._refused:
             return
         if info.channel_count() > MAX_CHANNELS or self._first + len(self._streams) > MAX_STREAMS:
@@ -239,7 +243,7 @@ def _plain(text: str) -> str:
     return str(text).encode('utf-8', 'replace').decode('utf-8')[:1000]
 
 
-def _attempt(ask: Callable[[], Any]) -> Any | None:
+def _attempt(ask: Callable[[], T]) -> T | None:
     """Return what liblsl answers; None while it has no answer yet."""
     from pylsl.util import TimeoutError as NoAnswerYet
     try:
@@ -248,7 +252,7 @@ def _attempt(ask: Callable[[], Any]) -> Any | None:
         return None
 
 
-def _time_correction(inlet: Any) -> tuple[float, float]:
+def _time_correction(inlet: 'StreamInlet') -> tuple[float, float]:
     """
     Return the newest offset, and its uncertainty: the round trip of its measurement [s].
 

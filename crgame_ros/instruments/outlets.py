@@ -173,7 +173,7 @@ class Outlet:
             pylsl.IRREGULAR_RATE, pylsl.cf_string if stream.texts else pylsl.cf_double64,
             self.source_id)
         _describe(info, stream)
-        self._outlet: Any = on_loopback(lambda: pylsl.StreamOutlet(info)) if local \
+        self._outlet = on_loopback(lambda: pylsl.StreamOutlet(info)) if local \
             else pylsl.StreamOutlet(info)
 
     def push(self, values: Sequence[float] | Sequence[str], steady_s: float) -> None:

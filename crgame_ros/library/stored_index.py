@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The user's cache: the entries of places, which can be made again, and files of archives."""
 
+from collections.abc import Mapping
 import contextlib
 import hashlib
 import json
@@ -41,7 +42,7 @@ def load_index(place: Path) -> dict[str, Any]:
     return found['content'] if known and isinstance(found['content'], dict) else {}
 
 
-def save_index(place: Path, content: dict[str, Any]) -> None:
+def save_index(place: Path, content: Mapping[str, object]) -> None:
     """Write what is known of a place, if the cache can be written."""
     file = _index_file(place)
     text = json.dumps({'format': FORMAT, 'place': str(place), 'content': content},

@@ -6,7 +6,6 @@ from array import array
 import gc
 import math
 import time
-from typing import Any
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
@@ -74,8 +73,7 @@ class PerceptionNode(Node):
                 self._world.begin(scenario)
             message = self._true.latest()
             if message is not None:
-                self._asked = from_joint_trajectory(
-                    message, f'/{self._vehicle_id}/true_request')
+                self._asked = from_joint_trajectory(message, f'/{self._vehicle_id}/true_request')
             for step in self._world.steps():
                 self._observe(step)
             self._answer()
@@ -193,7 +191,7 @@ class LocalizationMessage:
         self._publisher.publish(message)
 
 
-def _at_least(known: Array, place: tuple[Any, ...], part: Array) -> Array:
+def _at_least(known: Array, place: tuple[NDArray[np.intp], ...], part: Array) -> Array:
     """Return a covariance (36) with the filter's part, bounded below by the exact variance."""
     covariance = known.copy()
     covariance[place] = part

@@ -104,9 +104,10 @@ class TimesyncNode(Node):
         summary = metrics.summary()
         late = summary.worst_lag_ms > 10.0 * metrics.dt_s * 1e3
         values = summary.as_dict()
-        ratios = values.pop('real_time_ratio')
-        values.update({f'real_time_ratio_{key}': value for key, value in ratios.items()})
-        slow = slowness(ratios['final'])
+        del values['real_time_ratio']
+        values.update({f'real_time_ratio_{key}': value
+                       for key, value in vars(summary.real_time_ratio).items()})
+        slow = slowness(summary.real_time_ratio.final)
         if slow is not None and metrics.cycles * metrics.dt_s > SETTLED_S:
             complain(self, 'slow', slow)
         values['frame_skipping'] = self._skipping.active

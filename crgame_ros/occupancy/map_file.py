@@ -142,8 +142,7 @@ class MapFile:
         if count in (0, 256):
             return np.full(pixels.shape, count > 0)
         upright = pixels[::-1]
-        occupied: NDArray[np.bool_] = upright >= 256 - count if self.negate else upright < count
-        return occupied
+        return upright >= 256 - count if self.negate else upright < count
 
 
 def read_map_file(path: Path) -> MapFile:

@@ -39,8 +39,7 @@ class KeyedNoise:
     def __init__(self, seed: int, name: str, width: int, block: int = 256) -> None:
         words = np.frombuffer(name.encode(), dtype=np.uint8).tolist()
         # The length separates streams whose names begin alike.
-        self._key = np.random.SeedSequence([seed, len(words), *words]).generate_state(
-            2, np.uint64)
+        self._key = np.random.SeedSequence([seed, len(words), *words]).generate_state(2, np.uint64)
         self._width = width
         self._block = block
         self._number = -1
@@ -50,8 +49,7 @@ class KeyedNoise:
     def normal(self, n: int) -> Array:
         """Return the standard normal numbers (width) of step n."""
         row = self._row(n)
-        numbers: Array = self._normal[row]
-        return numbers
+        return self._normal[row]
 
     def uniform(self, n: int) -> float:
         """Return the number of step n that is uniform in [0, 1)."""

@@ -51,8 +51,7 @@ class Tracks:
         self._seen_n = np.full(count, -1, dtype=np.int64)
         self._until_n = np.full(count, -1, dtype=np.int64)
 
-    def update(self, things: Index, n: int, until_n: int, poses: Array,
-               velocities: Array) -> None:
+    def update(self, things: Index, n: int, until_n: int, poses: Array, velocities: Array) -> None:
         """
         Update with the things seen at step n; an older view does not replace a newer one.
 
@@ -70,8 +69,7 @@ class Tracks:
 
     def known(self, n: int) -> NDArray[np.bool_]:
         """Return which things (T) are seen or remembered at step n."""
-        found: NDArray[np.bool_] = n < self._until_n
-        return found
+        return n < self._until_n
 
     def predict(self, things: Index, n: int, times_s: Array) -> tuple[Array, Array]:
         """
@@ -280,8 +278,7 @@ class Perception:
         x, y, _ = sensor.pose(self._truth)
         return self._near(np.array([[x, y]]), sensor.spec.horizon)
 
-    def _placed(self, poses: Array, velocities: Array,
-                found: Detections) -> tuple[Array, Array]:
+    def _placed(self, poses: Array, velocities: Array, found: Detections) -> tuple[Array, Array]:
         """Place a sensor's detections (D, 3) in the map, by the estimated pose and with noise."""
         if self._localisation is not None:
             truth, estimate = self._truth, self._localisation.estimate
@@ -301,8 +298,7 @@ class Perception:
     def _deliver(self, n: int) -> None:
         for view in self._pending:
             if view.due_n <= n:
-                self._tracks.update(view.things, view.n, view.until_n, view.poses,
-                                    view.velocities)
+                self._tracks.update(view.things, view.n, view.until_n, view.poses, view.velocities)
         self._pending = [view for view in self._pending if view.due_n > n]
 
     def _fill(self, request: JointSeries, positions: Array, velocities: Array,

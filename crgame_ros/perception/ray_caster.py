@@ -93,8 +93,7 @@ class BorderCells:
         corners = self._corners - (x, y)
         middle = corners + 0.5 * grid.resolution
         close = np.einsum('ij,ij->i', middle, middle) <= (reach + grid.resolution) ** 2
-        near: Array = corners[close]
-        return near
+        return corners[close]
 
 
 def _border(grid: OccupancyGrid) -> Array:
@@ -105,8 +104,7 @@ def _border(grid: OccupancyGrid) -> Array:
                            & occupied[1:-1, :-2] & occupied[1:-1, 2:])
     rows, columns = np.nonzero(occupied & ~covered)
     cells = np.stack((columns, rows), axis=1).astype(np.float64)
-    corners: Array = grid.resolution * cells + grid.origin
-    return corners
+    return grid.resolution * cells + grid.origin
 
 
 # Pairs of a ray and something in its sector: rays, distances, bodies.
@@ -204,11 +202,9 @@ class RayCaster(Sensor):
         enter = np.minimum(first, second).max(axis=1)
         leave = np.maximum(first, second).min(axis=1)
         met = np.flatnonzero((enter <= leave) & (leave >= 0.0))
-        return (ray[met], np.maximum(enter[met], 0.0),
-                np.full(len(met), PERMANENT, dtype=np.intp))
+        return (ray[met], np.maximum(enter[met], 0.0), np.full(len(met), PERMANENT, dtype=np.intp))
 
 
 def _cross(a: Array, b: Array) -> Array:
     """Return the cross products (N) of plane vectors (N, 2)."""
-    product: Array = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return product
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]

@@ -80,8 +80,7 @@ class SensedBodies:
         starts = np.concatenate(([0], np.cumsum(counts)[:-1])).astype(np.intp)
         self._local: Array = np.concatenate(
             [corners for _, corners in cornered] or [np.empty((0, 2))])
-        self._body: Index = np.repeat(
-            np.array([i for i, _ in cornered], dtype=np.intp), counts)
+        self._body: Index = np.repeat(np.array([i for i, _ in cornered], dtype=np.intp), counts)
         self._next: Index = np.arange(1, len(self._local) + 1, dtype=np.intp)
         if counts:
             self._next[starts + counts - 1] = starts
@@ -168,8 +167,7 @@ def create_sensor(spec: SensorSpec, where: str = '') -> Sensor:
     :param where: the file and key that named it, for messages
     :raises InputError: if there is no sensor of that name, or it refuses its options.
     """
-    made: Sensor = SENSORS.create(spec.model, spec.options, where, spec=spec)
-    return made
+    return SENSORS.create(spec.model, spec.options, where, spec=spec)
 
 
 class Detections(NamedTuple):
@@ -234,8 +232,7 @@ class MountedSensor:
         scan = self._sensor.scan(pose, bodies, grid)
         self._check(scan)
         noise = self._noise.normal(n)
-        ranges = np.maximum(
-            scan.ranges + spec.range_noise * noise[_PER_THING * self._count:], 0.0)
+        ranges = np.maximum(scan.ranges + spec.range_noise * noise[_PER_THING * self._count:], 0.0)
         counts = np.bincount(scan.hits[scan.hits >= 0], minlength=self._count)
         things = np.flatnonzero(counts >= spec.min_rays)
         drawn = noise[:_PER_THING * self._count].reshape(-1, _PER_THING)[things]

@@ -5,7 +5,6 @@
 from collections.abc import Iterator, Mapping
 import contextlib
 import inspect
-from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.planner.interface import Planner
@@ -22,7 +21,7 @@ BUILT_IN = {
 }
 
 
-class PlannerRegistry(ModelRegistry):
+class PlannerRegistry(ModelRegistry[Planner]):
     """The planners of the package, of entry points, and of users."""
 
     def __init__(self) -> None:
@@ -57,7 +56,7 @@ class PlannerRegistry(ModelRegistry):
         return given if inspect.isclass(given) else type(given)
 
     def create(self, name: str, options: Mapping[str, object] | None = None, where: str = '',
-               **given: object) -> Any:
+               **given: object) -> Planner:
         """
         Create a planner, also of `policy:FILE.py:load`, or return the caller's own object.
 
@@ -123,8 +122,7 @@ def create_planner(name: str, options: Mapping[str, object] | None = None) -> Pl
     :raises InputError: if there is no such planner, or an option is unknown, missing or of the
         wrong type.
     """
-    made: Planner = PLANNERS.create(name, options)
-    return made
+    return PLANNERS.create(name, options)
 
 
 def planner_class(name: str) -> type[Planner]:

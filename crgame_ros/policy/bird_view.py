@@ -65,8 +65,7 @@ class BirdView:
         shift = np.array((0.5, AXLE)) * self._size - 0.5
 
         def pixels(points: Array) -> list[float]:
-            found: list[float] = ((points - middle) @ turn.T + shift).ravel().tolist()
-            return found
+            return ((points - middle) @ turn.T + shift).ravel().tolist()
 
         road, route, objects = (Image.new('L', (self._size, self._size)) for _ in range(3))
         draw = ImageDraw.Draw(road)

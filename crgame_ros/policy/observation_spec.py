@@ -99,8 +99,7 @@ class Depths:
 
     def of(self, part: Part) -> int:
         """Return the number of a part."""
-        depth: int = getattr(self, part)
-        return depth
+        return getattr(self, part)
 
 
 @dataclass(frozen=True)

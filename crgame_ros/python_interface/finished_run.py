@@ -13,6 +13,7 @@ from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.analysis.runs.run import Run as MeasuredRun
 from crgame_ros.python_interface.games import as_path, FileName
 from crgame_ros.recording.recorded_game import RecordedInputs
+from crgame_ros.recording.recorded_plans import ViolationEntry
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ class Run(MeasuredRun):
     """
 
     @property
-    def violations(self) -> list[dict[str, object]] | None:
+    def violations(self) -> list[ViolationEntry] | None:
         """Return the violations as in `timing.json`; None if unknown."""
         return None if self.outcome is None else self.outcome['drivability']['list']
 

@@ -54,7 +54,8 @@ def _rows(run: Run) -> Iterator[Sequence[str]]:
 
 def replays_html(recorded: Criticality, alternatives: Sequence[Alternative]) -> str:
     """Return the runs of one human against several planners, below the recorded one."""
-    found = [{'planner': 'recorded', 'criticality': recorded.as_dict()},
-             *(each.as_dict() for each in alternatives)]
+    found: list[dict[str, object]] = [
+        {'planner': 'recorded', 'criticality': recorded.as_dict()},
+        *(each.as_dict() for each in alternatives)]
     rows = [tuple(map(escape, row)) for row in replay_rows(found)]
     return table('The same human against other planners', HEAD, rows)

@@ -12,6 +12,7 @@ from crgame_ros.recording.conversion import convert_log, read_last_run
 from crgame_ros.recording.exceptions import RunTooShortError
 from crgame_ros.recording.progress import Progress
 from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.recorded_plans import RunReport
 from crgame_ros.recording.recover import recover
 from crgame_ros.recording.run_cycles import CYCLE_TOPIC
 from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, parts_of
@@ -36,7 +37,7 @@ class FinishedRecording(NamedTuple):
     bag: Path
     suffix: str
     log: RunTrajectories
-    timing: dict[str, object] | None
+    timing: RunReport | None
 
 
 def finish_run(folder: Path, say: Callable[[str], object], progress: bool = True,
@@ -98,7 +99,7 @@ def _derive(bag: Path, suffix: str, say: Callable[[str], object],
         return EMPTY, None
     # A run that cannot become a scenario still has its timing report.
     log = logs[0] if logs else None
-    reports: list[dict[str, object]] = []
+    reports: list[RunReport] = []
     timing = Progress(tell, f'reading the timing of {bag}')
     code |= _attempt(lambda: reports.append(write_timing_report(
         bag, folder / f'timing{suffix}.json', log=log, progress=timing)), say)

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from datetime import date, datetime, time
 from importlib.metadata import distribution
 from io import BytesIO
-from typing import Any
 from xml.etree import ElementTree
 
 from crgame_ros.errors import CrgameError, InputError, one_line
@@ -161,7 +160,7 @@ def _omissions(log: RunTrajectories, original: etree._Element, road: str | None)
 
 
 def _tracks(log: RunTrajectories, times_s: FloatArray,
-            notices: list[str]) -> list[tuple[_Track, Any]]:
+            notices: list[str]) -> list[tuple[_Track, object]]:
     """Return the motion and the entity of each vehicle and of each object that appeared."""
     states = log.finite_vehicle_states
     seen = np.isfinite(log.object_poses).all(axis=2).any(axis=0)
@@ -196,7 +195,7 @@ def _driven_track(name: str, times_s: FloatArray, states: FloatArray) -> _Track:
                   float(states[0, StateColumn.SPEED]))
 
 
-def _write_track(track: _Track, init: Any) -> list[Any]:
+def _write_track(track: _Track, init: xosc.Init) -> list[xosc.Event]:
     """Place an entity that is there from the beginning; return the events of its motion."""
     events = []
     for number, (first, end) in enumerate(present_pieces(track.poses), 1):
@@ -225,14 +224,16 @@ def _write_track(track: _Track, init: Any) -> list[Any]:
     return events
 
 
-def _follow(name: str, times_s: FloatArray, places: Sequence[Any]) -> Any:
+def _follow(name: str, times_s: FloatArray, places: Sequence[xosc.WorldPosition]
+            ) -> xosc.FollowTrajectoryAction:
     trajectory = xosc.Trajectory(name, False)
     trajectory.add_shape(xosc.Polyline(times_s.tolist(), list(places)))
     return xosc.FollowTrajectoryAction(trajectory, xosc.FollowingMode.position,
                                        xosc.ReferenceContext.absolute, 1.0, 0.0)
 
 
-def _event(name: str, actions: Sequence[tuple[str, Any]], trigger: Any) -> Any:
+def _event(name: str, actions: Sequence[tuple[str, object]],
+           trigger: xosc.ValueTrigger) -> xosc.Event:
     event = xosc.Event(name, xosc.Priority.parallel)
     for what, action in actions:
         event.add_action(what, action)
@@ -240,14 +241,14 @@ def _event(name: str, actions: Sequence[tuple[str, Any]], trigger: Any) -> Any:
     return event
 
 
-def _at(name: str, time_s: float, rule: Any = xosc.Rule.greaterOrEqual,
-        kind: str = 'start') -> Any:
+def _at(name: str, time_s: float, rule: xosc.Rule = xosc.Rule.greaterOrEqual,
+        kind: str = 'start') -> xosc.ValueTrigger:
     """Return a trigger at a time of the simulation."""
     return xosc.ValueTrigger(name, 0.0, xosc.ConditionEdge.none,
                              xosc.SimulationTimeCondition(float(time_s), rule), kind)
 
 
-def _document(scenario: Any) -> str:
+def _document(scenario: xosc.Scenario) -> str:
     """
     Return the file's text.
 
@@ -279,11 +280,11 @@ class Body:
     """
     A vehicle or object in OpenSCENARIO.
 
-    :param entity: its description: a `Vehicle`, `Pedestrian` or `MiscObject` of the library.
+    :param entity: its description.
     :param ahead: from the reference point of its recorded poses forward to that of the entity [m]
     """
 
-    entity: Any
+    entity: xosc.Vehicle | xosc.Pedestrian | xosc.MiscObject
     ahead: float
 
 
@@ -330,7 +331,7 @@ def _body_notices(items: list[ObjectDescription]) -> list[str]:
               for kind, names in types.items())]
 
 
-def _driven(item: ObjectDescription, parameters: VehicleParameters) -> Any:
+def _driven(item: ObjectDescription, parameters: VehicleParameters) -> xosc.Vehicle:
     braking = min(parameters.max_brake_force / parameters.mass,
                   parameters.friction * parameters.gravity) or _ACCELERATION
     return _vehicle(item, parameters.height or item.height, parameters.rear_to_center,
@@ -339,7 +340,7 @@ def _driven(item: ObjectDescription, parameters: VehicleParameters) -> Any:
                     parameters.mass)
 
 
-def _other_vehicle(item: ObjectDescription) -> tuple[Any, float]:
+def _other_vehicle(item: ObjectDescription) -> tuple[xosc.Vehicle, float]:
     usual = MOVER_TYPES.get(item.type, MOVER_TYPES['car'])
     scale = item.shape.length / usual.shape.length
     rear_to_center = usual.rear_to_center * scale
@@ -349,7 +350,8 @@ def _other_vehicle(item: ObjectDescription) -> tuple[Any, float]:
 
 
 def _vehicle(item: ObjectDescription, height: float, rear_to_center: float, wheelbase: float,
-             steering: float, limits: tuple[float, float, float], mass: float | None) -> Any:
+             steering: float, limits: tuple[float, float, float],
+             mass: float | None) -> xosc.Vehicle:
     """
     Describe a vehicle.
 
@@ -363,7 +365,7 @@ def _vehicle(item: ObjectDescription, height: float, rear_to_center: float, whee
                         front, rear, *map(_number, limits), mass)
 
 
-def _box(shape: Shape, height: float, ahead: float) -> Any:
+def _box(shape: Shape, height: float, ahead: float) -> xosc.BoundingBox:
     """
     Return the box around a footprint.
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 import math
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypedDict
 
 from crgame_ros.errors import InputError
 from crgame_ros.messages.cdr import header_stamp_ns
@@ -22,6 +22,7 @@ from crgame_ros.messages.request_layout import request_head
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.storage import BagMessage
+from crgame_ros.simulation.contacts import ContactEntry
 from crgame_ros.simulation.offline import OfflineResult, PlannerRecord
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
@@ -31,6 +32,17 @@ from numpy.typing import NDArray
 # look further back either.
 _KEPT = 64
 Spread = Mapping[str, float]
+# Of `timing.json`: a violation, all of them, and the whole content but some numbers.
+ViolationEntry = TypedDict('ViolationEntry', {  # noqa: UP013
+    'n': int | None, 'vehicle': str, 'what': str})
+Violations = TypedDict('Violations', {  # noqa: UP013
+    'violations': int, 'list': list[ViolationEntry]})
+RunReport = TypedDict('RunReport', {  # noqa: UP013
+    'planners': dict[str, dict[str, object]], 'drivability': Violations,
+    'contacts': list[ContactEntry] | None, 'notices': list[str], 'max_cumulative_error_ms': float,
+    'real_time_ratio': dict[str, float], 'late_steps': Mapping[str, object] | None,
+    'sound': Mapping[str, Mapping[str, Any]], 'view': Mapping[str, Sequence[Mapping[str, Any]]],
+}, total=False)
 # The engine's counts in a status `sim_node: <av> plans`.
 PLAN_COUNTS = ('requests', 'accepted', 'refused', 'of_others', 'skipped', 'timed_out', 'realigned',
                'steps_without_plan')
@@ -236,7 +248,7 @@ class PlanOutcome:
         return 'it never answered'
 
 
-def plans_of_report(report: Mapping[str, Any] | None) -> dict[str, PlanOutcome]:
+def plans_of_report(report: RunReport | None) -> dict[str, PlanOutcome]:
     """
     Return the entries by AV.
 

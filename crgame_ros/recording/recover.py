@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 import sqlite3
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from crgame_ros.errors import InputError
 from crgame_ros.recording.exceptions import RecordingError
@@ -168,7 +168,7 @@ def _finish(path: Path, progress: Callable[[float], object] | None) -> int | Non
 def _copy(source: McapFile, target: BinaryIO,
           progress: Callable[[float], object] | None) -> tuple[int, int]:
     """Copy all messages; return their number, and the bytes of those with unknown channel."""
-    writer: Any = Writer(target, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+    writer = Writer(target, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
     writer.start(source.header.profile, source.header.library)
     schemas: dict[int, int] = {}
     channels: dict[int, int] = {}
@@ -197,8 +197,7 @@ def _register(source: McapFile, number: int, writer: Writer, schemas: dict[int, 
     channel = source.channels[number]
     schema = source.schemas.get(channel.schema_id)
     if schema is not None and schema.id not in schemas:
-        schemas[schema.id] = writer.register_schema(
-            schema.name, schema.encoding, schema.data)
+        schemas[schema.id] = writer.register_schema(schema.name, schema.encoding, schema.data)
     channels[number] = writer.register_channel(
         channel.topic, channel.message_encoding, schemas.get(channel.schema_id, 0),
         channel.metadata)

@@ -6,7 +6,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.errors import InputError
@@ -23,14 +23,22 @@ from crgame_ros.recording.recorded_plans import (
     PLAN_COUNTS,
     PlanOutcome,
     plans_of_result,
+    RunReport,
     spread_of,
+    ViolationEntry,
 )
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.run_points import read_points
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.recording.storage import BagMessage
 from crgame_ros.recording.views import SeatSound, ViewPeriods
-from crgame_ros.simulation.contacts import Contact, contacts_of, find_contacts, Motions
+from crgame_ros.simulation.contacts import (
+    Contact,
+    ContactEntry,
+    contacts_of,
+    find_contacts,
+    Motions,
+)
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.timing.late_steps import LateSteps
 from crgame_ros.timing.metrics import slowness, TimingMetrics
@@ -119,7 +127,7 @@ _WORST = 'worst_'
 
 
 def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | None = None,
-                  progress: Callable[[float], object] | None = None) -> dict[str, object]:
+                  progress: Callable[[float], object] | None = None) -> RunReport:
     """
     Compute a recorded run's report; `docs/recordings.md` and `docs/timing.md` define the keys.
 
@@ -146,9 +154,10 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
             collected.add(message, reader)
         contacts, unknown = _contacts(reader, run, collected.verdicts, collected.fired)
         planners = {av: collected.planner(av) for av in collected.avs}
-        summary = metrics.summary().as_dict()
-        return {
-            **summary,
+        summary = metrics.summary()
+        # With table I.
+        return cast(RunReport, {
+            **summary.as_dict(),
             'late_steps': late.as_dict(),
             # The first row belongs to the step to n = 1.
             'gaps': int(numbers[-1]) - len(numbers),
@@ -167,12 +176,12 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
                 *(f'/{av}/plan: {each.of_others} plans of other programs than its planner, '
                   'which were not taken' for av, each in planners.items() if each.of_others),
                 *unknown, *([_VIRTUAL] if reader.has_virtual_clock else []),
-                *filter(None, [slowness(summary['real_time_ratio']['final'])])))]}
+                *filter(None, [slowness(summary.real_time_ratio.final)])))]})
 
 
 def write_timing_report(bag: Path, path: Path, epoch: int | None = None,
                         log: RunTrajectories | None = None,
-                        progress: Callable[[float], object] | None = None) -> dict[str, object]:
+                        progress: Callable[[float], object] | None = None) -> RunReport:
     """
     Write `timing.json`, completely or not at all.
 
@@ -188,11 +197,10 @@ def write_timing_report(bag: Path, path: Path, epoch: int | None = None,
 
 def _contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleDrivability],
               fired: Sequence[FiredEvent]
-              ) -> tuple[list[dict[str, object]] | None, tuple[str, ...]]:
+              ) -> tuple[list[ContactEntry] | None, tuple[str, ...]]:
     """Return the entries of the contacts, or None and the reason if they are not known."""
     try:
-        return [item.as_dict() for item in recorded_contacts(
-            reader, run, verdicts, fired)], ()
+        return [item.as_dict() for item in recorded_contacts(reader, run, verdicts, fired)], ()
     except (InputError, ValueError, GEOSException) as error:
         # States from another sender may have no outlines.
         return None, (f'contacts are not named: {error}',)
@@ -209,7 +217,7 @@ class _Collector:
         self._plans = {f'/{av}/plan': av for av in self.avs}
         self._verdicts = {f'/{vehicle}/drivability': vehicle for vehicle in vehicles}
         self.topics = (_DIAGNOSTICS, EVENTS.topic, *self._requests, *self._plans, *self._verdicts)
-        self.violations: list[dict[str, object]] = []
+        self.violations: list[ViolationEntry] = []
         self.verdicts: list[VehicleDrivability] = []
         self.fired: tuple[FiredEvent, ...] = ()
         self._lasting: dict[str, set[str]] = defaultdict(set)
@@ -327,7 +335,7 @@ def _count(values: dict[str, str], key: str) -> int | None:
     return int(text) if text.isdecimal() else None
 
 
-def offline_outcome(result: OfflineResult) -> dict[str, object]:
+def offline_outcome(result: OfflineResult) -> RunReport:
     """Return the entries `planners`, `drivability` and `contacts`, as `timing_report` does."""
     violations = _violations(result)
     return {'planners': {av: each.as_dict() for av, each in plans_of_result(result).items()},
@@ -336,9 +344,9 @@ def offline_outcome(result: OfflineResult) -> dict[str, object]:
             'notices': list(result.setup.notices)}
 
 
-def _violations(result: OfflineResult) -> list[dict[str, object]]:
+def _violations(result: OfflineResult) -> list[ViolationEntry]:
     """Return the violations by their beginnings, in order."""
-    found: list[dict[str, object]] = []
+    found: list[ViolationEntry] = []
     lasting: dict[str, set[str]] = {}
     for verdict in result.violations:
         violated = set(verdict.faults)

@@ -9,7 +9,7 @@ import math
 from pathlib import Path
 import re
 import statistics
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.view_documents import VIEW_PICTURE, ViewEye, ViewPicture, ViewPlace
@@ -39,7 +39,7 @@ class SeatSound:
             told = (status_truth(values, 'on'), volume, rumble)
             self._told.setdefault(found[1], []).append(told)
 
-    def as_dict(self) -> dict[str, dict[str, Any]]:
+    def as_dict(self) -> Mapping[str, Mapping[str, object]]:
         """
         Return by seat: the share of statuses with sound on, the median volume then, and rumble.
 
@@ -72,7 +72,7 @@ _MEASURES = ('across_deg', 'screen_width_m', 'eye_distance_m', 'width_px', 'heig
 class _Told(NamedTuple):
     time_s: float
     # The values by key; a change of one begins a new period.
-    choice: dict[str, Any]
+    choice: Mapping[str, object]
     ratio: float | None
     rate_hz: float | None
 
@@ -101,7 +101,7 @@ class ViewPeriods:
             _Told(time_s, choice, status_amount(values, 'ratio'),
                   status_amount(values, 'rate_hz')))
 
-    def as_dict(self) -> dict[str, list[dict[str, Any]]]:
+    def as_dict(self) -> dict[str, list[dict[str, object]]]:
         """
         Return by seat the periods with an unchanged view.
 

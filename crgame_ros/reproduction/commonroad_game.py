@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Repeats CommonRoad-Game's evaluation (CRG section IV): recordings, figures, report."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 import json
 import os
@@ -295,11 +295,11 @@ def _lines(request: EvaluationRequest, judgements: Sequence[Judgement],
             yield from (caption, '', f'![{name}]({shown[name].name})', '')
 
 
-def _table(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
+def _table(rows: Sequence[Mapping[str, object]]) -> Iterator[str]:
     yield '| metric | ours | paper | naive, ours | naive, paper |'
     yield '|---|---:|---:|---:|---:|'
     for row, form in zip(rows, (each.form for each in TIMING_ROWS), strict=True):
         name = f'{row["metric"]} [{row["unit"]}]' if row['unit'] else row['metric']
-        paper, paper_naive = PAPER_TABLE[row['metric']]
+        paper, paper_naive = PAPER_TABLE[str(row['metric'])]
         yield (f'| {name} | {row["proposed"]:{form}} | {paper} | {row["naive"]:{form}} '
                f'| {paper_naive} |')

@@ -130,8 +130,7 @@ class RoadBoundary:
         if len(poses) > 1 and np.isfinite(poses).all() and shapely.contains(
                 self._surface, shapely.convex_hull(shapely.linestrings(outlines.reshape(-1, 2)))):
             return np.zeros(len(poses), dtype=bool)
-        off: NDArray[np.bool_] = ~shapely.contains(self._surface, shapely.polygons(outlines))
-        return off
+        return ~shapely.contains(self._surface, shapely.polygons(outlines))
 
     def are_beyond(self, poses: NDArray[np.float64], shape: Shape,
                    distance: float) -> NDArray[np.bool_]:
@@ -142,8 +141,7 @@ class RoadBoundary:
         """
         corners = self._footprint(shape).outlines(poses - (*self._origin, 0.0))
         near = shapely.dwithin(self._surface, shapely.points(corners), distance)
-        beyond: NDArray[np.bool_] = ~near.all(axis=1)
-        return beyond
+        return ~near.all(axis=1)
 
     def overhang(self, x_center: float, y_center: float, yaw: float, shape: Shape) -> float:
         """

@@ -73,8 +73,7 @@ def polygons_of(geometry: shapely.Geometry | NDArray[np.object_]) -> list[shapel
     """Return the polygons with an area in a geometry, or in an array of geometries."""
     parts = shapely.get_parts(shapely.get_parts(geometry))
     is_polygon = shapely.get_type_id(parts) == shapely.GeometryType.POLYGON
-    polygons: list[shapely.Polygon] = parts[is_polygon & (shapely.area(parts) > 0.0)].tolist()
-    return polygons
+    return parts[is_polygon & (shapely.area(parts) > 0.0)].tolist()
 
 
 def _closed(surface: shapely.Geometry) -> shapely.Geometry:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 import ctypes
 from functools import cache
 import time
-from typing import Any, NamedTuple, TYPE_CHECKING
+from typing import Any, Generic, NamedTuple, TYPE_CHECKING, TypeVar
 from weakref import WeakKeyDictionary
 
 from crgame_ros.errors import InputError
@@ -26,7 +26,9 @@ from rclpy.subscription import Subscription
 
 if TYPE_CHECKING:
     from rclpy.action import ActionServer
+    from rclpy.action.server import ServerGoalHandle
 
+T = TypeVar('T')
 PERIOD_S = 1.0
 # Unusable messages, and those for other nodes, are skipped: at most this many per read.
 MAX_PASSED_OVER = 100
@@ -63,7 +65,7 @@ class PolledGroup(CallbackGroup):
         """Do nothing, as there is nothing to release."""
 
 
-class PolledSubscription:
+class PolledSubscription(Generic[T]):
     """
     A subscription that is read when its owner chooses, without an executor.
 
@@ -81,7 +83,7 @@ class PolledSubscription:
         skipped before they are converted. None accepts every message.
     """
 
-    def __init__(self, subscription: Subscription, name: str, read: Callable[[bytes], object],
+    def __init__(self, subscription: Subscription, name: str, read: Callable[[bytes], T],
                  refuse: Callable[[str, str], None] | None, sent: bool = False) -> None:
         self.subscription = subscription
         self.publisher = b''
@@ -91,12 +93,12 @@ class PolledSubscription:
         self._refuse = refuse
         self._sent = sent
 
-    def pop(self) -> Any | None:
+    def pop(self) -> T | None:
         """Remove and return the oldest message (or its bytes, if raw); None without any."""
         taken = self.pop_timed()
         return None if taken is None else taken[0]
 
-    def pop_timed(self) -> tuple[Any, int, int] | None:
+    def pop_timed(self) -> tuple[T, int, int] | None:
         """Return what `pop` does, with the times of publication and reception [ns since 1970]."""
         # The rest of a flood of unusable messages waits.
         for _ in range(MAX_PASSED_OVER):
@@ -129,7 +131,7 @@ class PolledSubscription:
         data, info = taken
         return data, int(info['source_timestamp']), int(info['received_timestamp'])
 
-    def latest(self) -> Any | None:
+    def latest(self) -> T | None:
         """Remove all waiting messages and return the newest, None if there is none."""
         newest = None
         while (message := self.pop()) is not None:
@@ -178,7 +180,7 @@ class Endpoints:
 
     def polled(self, name: str, vehicle_id: str = '', *, raw: bool = False,
                depth: int | None = None, strict: bool = False,
-               verify: bool = False, sent: bool = False) -> PolledSubscription:
+               verify: bool = False, sent: bool = False) -> PolledSubscription[Any]:
         """
         Create a subscription that the node reads itself.
 
@@ -200,13 +202,13 @@ class Endpoints:
         return PolledSubscription(subscription, intake.name, read,
                                   None if strict else self.refusals.note, sent)
 
-    def publishers(self, slot: PolledSubscription) -> dict[bytes, str]:
+    def publishers(self, slot: PolledSubscription[object]) -> dict[bytes, str]:
         """Return the full names of the nodes that publish what is subscribed to, by publisher."""
         return {bytes(info.endpoint_gid): f'{info.node_namespace.rstrip("/")}/{info.node_name}'
                 for info in self._node.get_publishers_info_by_topic(
                     slot.subscription.topic_name)}
 
-    def release(self, slot: PolledSubscription) -> None:
+    def release(self, slot: PolledSubscription[object]) -> None:
         """Destroy a subscription."""
         self._node.destroy_subscription(slot.subscription)
 
@@ -218,8 +220,9 @@ class Endpoints:
             message_type(row.type_name), relative(name.replace('<av>', vehicle_id)), callback,
             qos_profile=QoSProfile(depth=SERVICE_DEPTH), callback_group=group)
 
-    def action(self, name: str, execute: Callable[[Any], object],
-               cancel: Callable[[Any], bool], group: CallbackGroup) -> 'ActionServer':
+    def action(self, name: str, execute: 'Callable[[ServerGoalHandle], object]',
+               cancel: 'Callable[[ServerGoalHandle], bool]',
+               group: CallbackGroup) -> 'ActionServer':
         """
         Create an action, of which the owner must keep what is returned.
 
@@ -342,7 +345,7 @@ def _take_sent(subscription: Subscription) -> SentMessage | None:
 
 
 @cache
-def _rcl() -> tuple[Any, _Bytes]:
+def _rcl() -> tuple[ctypes.CDLL, _Bytes]:
     """Return the library that rclpy has loaded, and a buffer that it fills and enlarges."""
     tools = ctypes.CDLL('librcutils.so')
     tools.rcutils_get_default_allocator.restype = _Allocator

@@ -8,7 +8,6 @@ of their values would take seconds. Numbers never have an exponent, which the sc
 """
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 from xml.sax.saxutils import quoteattr
 
 from commonroad.common.util import Interval
@@ -250,7 +249,7 @@ def _commonroad_shape(shape: CommonRoadShape) -> str:
     raise TypeError(f'no shape of CommonRoad: {type(shape).__name__}')
 
 
-def interval_bounds(value: Any) -> tuple[float, float]:
+def interval_bounds(value: Interval | float) -> tuple[float, float]:
     """Return the bounds of an interval, or a single value twice."""
     if isinstance(value, Interval):
         return float(value.start), float(value.end)

@@ -148,8 +148,7 @@ def parse_scenario(xml_text: str, source: str) -> LoadedScenario:
     :param source: file name or topic for messages
     :raises InputError: naming file, element and remedy, if it cannot be used.
     """
-    loaded: LoadedScenario = pickle.loads(_pickled(xml_text, source))
-    return loaded
+    return pickle.loads(_pickled(xml_text, source))
 
 
 @lru_cache(_KEPT)

@@ -110,8 +110,7 @@ def mark_of(marks: tuple[object, ...], kind: type[T]) -> T | None:
 
 def form_of(kind: type[object]) -> Form:
     """Return the form of a dataclass in a file."""
-    form: Form = getattr(kind, 'FORM', _PLAIN)
-    return form
+    return getattr(kind, 'FORM', _PLAIN)
 
 
 _PLAIN = Form()
@@ -162,11 +161,12 @@ def sentences_of(kind: type[object]) -> dict[str, str]:
 
 
 @functools.cache
-def split(hint: Any) -> tuple[object, tuple[object, ...]]:
+def split(hint: object) -> tuple[object, tuple[object, ...]]:
     """Return a type without marks, and its marks, including those of the one type beside None."""
     marks: tuple[object, ...] = ()
     if get_origin(hint) is Annotated:
-        hint, marks = hint.__origin__, hint.__metadata__
+        hint, *given = get_args(hint)
+        marks = tuple(given)
     choices = choices_of(hint)
     if len(choices) == 2 and types.NoneType in choices:
         inner, more = split(next(choice for choice in choices if choice is not types.NoneType))
@@ -202,7 +202,7 @@ def wanted(hint: object, marks: tuple[object, ...] = ()) -> str:
     return ', or '.join([text, *others])
 
 
-def _wanted(hint: Any, marks: tuple[object, ...]) -> str:
+def _wanted(hint: object, marks: tuple[object, ...]) -> str:
     origin = get_origin(hint)
     if origin is Literal:
         return 'one of ' + ', '.join(map(str, get_args(hint)))

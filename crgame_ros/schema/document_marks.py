@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import math
 from typing import Any, get_args
 
+from crgame_ros.schema.marks import Handler
 from crgame_ros.schema.reading import read
 from crgame_ros.schema.writing import write
 
@@ -24,7 +25,7 @@ class Bounded:
 
     most: int
 
-    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> object:
+    def __get_pydantic_core_schema__(self, source: object, handler: Handler) -> object:
         """Return the schema of the marked type, for pydantic."""
         schema = handler(source)
         if schema['type'] in ('list', 'tuple'):
@@ -41,7 +42,7 @@ class Bounded:
 class Exact:
     """A mark for the type of a value that must have it: no text is a number, no flag either."""
 
-    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> object:
+    def __get_pydantic_core_schema__(self, source: object, handler: Handler) -> object:
         """Return the schema of the marked type, for pydantic."""
         return handler(source) | {'strict': True}
 
@@ -52,7 +53,7 @@ class Otherwise:
 
     known: str
 
-    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> Any:
+    def __get_pydantic_core_schema__(self, source: object, handler: Handler) -> object:
         """Return the schema of the marked type, for pydantic."""
         return {'type': 'function-before', 'schema': handler(source), 'function': {
             'type': 'no-info', 'function': lambda given:
@@ -65,9 +66,9 @@ class Derived:
 
     names: tuple[str, ...]
 
-    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> object:
+    def __get_pydantic_core_schema__(self, source: object, handler: Handler) -> object:
         """Return the schema of the marked class, for pydantic."""
-        def write_all(value: object, write_fields: Any) -> object:
+        def write_all(value: object, write_fields: Handler) -> object:
             return write_fields(value) | {name: getattr(value, name) for name in self.names}
         return handler(source) | {
             'serialization': {'type': 'function-wrap', 'function': write_all}}
@@ -76,7 +77,8 @@ class Derived:
 class Row:
     """A mark for a class that is written as the list of its finite numbers."""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> object:
+    def __get_pydantic_core_schema__(self, source: Callable[..., object],
+                                     handler: object) -> object:
         """Return the schema of the marked class, for pydantic."""
         names = tuple(source.__annotations__)
 
@@ -120,7 +122,7 @@ class Declared:
 
 
 def _plain_schema(read_value: Callable[[object, Any], object],
-                  write_value: Callable[[Any], object]) -> object:
+                  write_value: Callable[[object], object]) -> object:
     """Return the schema of a value that two functions read and write."""
     return {'type': 'function-plain', 'function': {'type': 'with-info', 'function': read_value},
             'serialization': {'type': 'function-plain', 'function': write_value}}

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The kinds of YAML files that users write, the classes that declare them, and JSON Schemas."""
 
-from collections.abc import Mapping
 from dataclasses import is_dataclass, MISSING
 import importlib
 import inspect
@@ -36,7 +35,7 @@ from crgame_ros.schema.marks import (
 from crgame_ros.schema.reading import keys_beside
 from crgame_ros.schema.writing import write
 
-Schema = dict[str, Any]
+Schema = dict[str, object]
 DIALECT = 'https://json-schema.org/draft/2020-12/schema'
 
 
@@ -98,9 +97,9 @@ class _Describer:
         bounds = tuple(mark for mark in marks if isinstance(mark, Within))
         if items[-1] is Ellipsis:
             listed = mark_of(marks, Listed) or Listed()
-            return {'type': 'array', 'items': self.describe(items[0], bounds)} \
-                | ({'minItems': listed.least} if listed.least else {}) \
-                | ({'maxItems': listed.most} if listed.most else {})
+            return {'type': 'array', 'items': self.describe(items[0], bounds),
+                    **({'minItems': listed.least} if listed.least else {}),
+                    **({'maxItems': listed.most} if listed.most else {})}
         parts = mark_of(marks, Parts)
         return {'type': 'array', 'prefixItems': [self.describe(item, bounds) for item in items],
                 'items': False, 'minItems': len(items) - (parts.optional if parts else 0)}
@@ -108,14 +107,15 @@ class _Describer:
     def _mapping(self, kind: Any) -> Schema:
         form, keys = form_of(kind), keys_of(kind)
         properties: dict[str, Schema] = {}
+        required = [key.name for key in keys if _is_required(key) and key.name != form.rest]
         schema: Schema = {
             'description': inspect.cleandoc(kind.__doc__ or '').split('\n')[0],
             'type': 'object', 'properties': properties, 'additionalProperties': False,
-            'required': [key.name for key in keys if _is_required(key) and key.name != form.rest]}
+            'required': required}
         for key in keys:
             keyed = key.mark(Keyed)
             if keyed is not None:
-                schema['required'].remove(key.name)
+                required.remove(key.name)
                 properties |= {name: self.describe(one) for name, one in keyed.kinds.items()}
                 schema['oneOf'] = [{'required': [name]} for name in keyed.kinds]
             elif form.rest == key.field:
@@ -140,7 +140,8 @@ class _Describer:
         return schema
 
     def _property(self, kind: Any, key: Key) -> Schema:
-        said = {'description': sentence} if (sentence := sentences_of(kind).get(key.field)) else {}
+        sentence = sentences_of(kind).get(key.field)
+        said: Schema = {'description': sentence} if sentence else {}
         default = key.default
         if default is not MISSING and default is not None and default != math.inf:
             said['default'] = write(default)
@@ -151,7 +152,7 @@ def _is_required(key: Key) -> bool:
     return key.required and key.mark(Numbered) is None and key.mark(Folder) is None
 
 
-def _number(kind: type[Any], within: Within) -> Schema:
+def _number(kind: type[object], within: Within) -> Schema:
     schema: Schema = {'type': 'number' if kind is float else 'integer'}
     if within.low != -math.inf:
         schema['exclusiveMinimum' if within.above else 'minimum'] = within.low
@@ -160,7 +161,7 @@ def _number(kind: type[Any], within: Within) -> Schema:
     return {'anyOf': [schema, {'const': 0}]} if within.or_zero else schema
 
 
-def _conditions(kind: Any) -> list[Schema]:
+def _conditions(kind: type[object]) -> list[Schema]:
     """Return the conditions on combinations of keys and values."""
     form = form_of(kind)
     found: list[Schema] = []
@@ -179,7 +180,7 @@ def _conditions(kind: Any) -> list[Schema]:
     return found
 
 
-def _is(key: str, value: str) -> Mapping[str, Any]:
+def _is(key: str, value: str) -> Schema:
     return {'properties': {key: {'const': value}}, 'required': [key]}
 
 
@@ -199,18 +200,18 @@ class FileKind(NamedTuple):
     @property
     def declared(self) -> type[object]:
         """Return the class that declares it."""
-        kind: type[object] = getattr(importlib.import_module(self.module), self.name)
-        return kind
+        return getattr(importlib.import_module(self.module), self.name)
 
-    def schema(self) -> dict[str, Any]:
+    def schema(self) -> Schema:
         """Return its JSON Schema."""
         return json_schema(self.declared, self.title)
 
     def keys(self) -> frozenset[str]:
         """Return the top-level keys of such a file."""
-        schema = self.schema()
-        root = schema['$defs'][schema['$ref'].rpartition('/')[2]]
-        return frozenset(root.get('properties', ()))
+        describer = _Describer()
+        describer.describe(self.declared)
+        properties = describer.definitions[self.name].get('properties')
+        return frozenset(properties if isinstance(properties, dict) else ())
 
 
 FILE_KINDS = {

@@ -3,14 +3,16 @@
 """Marks for `Annotated`, which express conditions that types cannot."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 import math
 from pathlib import Path
 import re
-from typing import Any
 
 from crgame_ros.registry import POLICY
 
+# Returns the schema of a type, for pydantic.
+Handler = Callable[[object], dict[str, object]]
 # Comparison and representation are not needed; without them, marks take half the import time.
 
 
@@ -38,7 +40,7 @@ class Within:
             return False
         return self.low <= value <= self.high and not (self.above and value == self.low)
 
-    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> object:
+    def __get_pydantic_core_schema__(self, source: object, handler: Handler) -> object:
         """Return the schema of the marked number, for pydantic; in JSON null is infinity."""
         def check(number: float) -> float:
             if not self.holds(number):

@@ -24,7 +24,7 @@ class Option(NamedTuple):
     meaning: str
 
 
-def options_of(registry: ModelRegistry, name: str) -> list[Option]:
+def options_of(registry: ModelRegistry[object], name: str) -> list[Option]:
     """
     Return the options of a model.
 

@@ -139,7 +139,7 @@ class _Reader:
             return self._list(hint, marks, given, key, where)
         return self._plain(hint, marks, given, key, where)
 
-    def mapping(self, kind: Any, marks: tuple[Any, ...], given: object, where: str,
+    def mapping(self, kind: Any, marks: tuple[object, ...], given: object, where: str,
                 index: int | None = None) -> object:
         form = form_of(kind)
         if form.short is not None and isinstance(given, str):
@@ -246,7 +246,7 @@ class _Reader:
         return (*read, *(0.0,) * missing)
 
     def _part(self, item: object, marks: tuple[object, ...], given: object,
-              whole: tuple[object, Any], key: str, where: str) -> object:
+              whole: tuple[object, tuple[object, ...]], key: str, where: str) -> object:
         """Read a plain value in a list; errors advise on the list, with its type and marks."""
         try:
             return self.value(item, marks, given, key, where)
@@ -317,8 +317,7 @@ class _Reader:
                     and (wording is None or wording.fits(given)) and (given or plain is str):
                 if plain is Path:
                     sought = mark_of(marks, Sought)
-                    return self._base / given if sought is None \
-                        else sought.find(given, self._base)
+                    return self._base / given if sought is None else sought.find(given, self._base)
                 named = mark_of(marks, Named)
                 return given if named is None else named.resolved(given, self._base)
         elif isinstance(plain, type) and isinstance(given, plain):
@@ -341,12 +340,13 @@ def _as_yaml(given: object) -> str:
     return ' (YAML: 1.0e-3, not 1e-3)' if number else ''
 
 
-def moved(form: Form, given: Mapping[object, Any]) -> dict[object, object]:
+def moved(form: Form, given: Mapping[object, object]) -> dict[object, object]:
     """Return the values with moved keys in the sections to which they belong."""
     values = dict(given)
     for key, section in form.moved:
-        if key in values and isinstance(values.get(section, {}), Mapping):
-            values[section] = {**values.get(section, {}), key: values.pop(key)}
+        beside = values.get(section, {})
+        if key in values and isinstance(beside, Mapping):
+            values[section] = {**beside, key: values.pop(key)}
     return values
 
 

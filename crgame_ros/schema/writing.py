@@ -50,7 +50,7 @@ def _mapping(value: object, base: Path) -> dict[str, object]:
     return {name: entries[name] for name in (*form.first, *entries) if name in entries}
 
 
-def _is_left_out(key: Key, item: Any, form: Form, value: object) -> bool:
+def _is_left_out(key: Key, item: object, form: Form, value: object) -> bool:
     if key.mark(Folder) or key.mark(LeftOut) and item == key.default:
         return True
     beside = key.mark(OnlyWith)

@@ -58,8 +58,7 @@ class Boundary:
 
     def probabilities(self, variants: Sequence[Variant]) -> Array:
         """Return the probability (N) that each of some variants fails."""
-        found: Array = self._model.predict_proba(features(self._space, variants))[:, 1]
-        return found
+        return self._model.predict_proba(features(self._space, variants))[:, 1]
 
 
 def _nearest_to_boundary(rows: Array, fails: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 import warnings
 
 from crgame_ros.errors import CrgameError, InputError
@@ -34,6 +34,11 @@ from crgame_ros.search.trials import Outcome, Trials
 from crgame_ros.simulation.av_assignment import OWN
 from crgame_ros.variation.space import space_of, Variant, VariantSpace
 import numpy as np
+
+if TYPE_CHECKING:
+    from optuna import Study, Trial
+    from optuna.distributions import BaseDistribution
+    from optuna.samplers import BaseSampler
 
 # Points asked for until one keeps the constraints.
 _ASKED = 100
@@ -189,7 +194,7 @@ def explore(space: VariantSpace, trials: Trials, settings: SearchSettings, runs:
         _Exploration(study, space, trials, settings).run(runs)
 
 
-def _sampler(settings: SearchSettings) -> Any:
+def _sampler(settings: SearchSettings) -> 'BaseSampler':
     from optuna import samplers
     seed = settings.seed
     if settings.sampler == 'random':
@@ -206,16 +211,16 @@ def _sampler(settings: SearchSettings) -> Any:
 class _Exploration:
     """An Optuna study in the unit cube."""
 
-    def __init__(self, study: Any, space: VariantSpace, trials: Trials,
+    def __init__(self, study: 'Study', space: VariantSpace, trials: Trials,
                  settings: SearchSettings) -> None:
         from optuna.distributions import CategoricalDistribution, FloatDistribution
         from optuna.trial import TrialState
         self._study, self._space, self._trials = study, space, trials
         self._settings = settings
         self._failed = TrialState.FAIL
-        self._axes = {axis.name: CategoricalDistribution(range(len(axis.spec.values)))
-                      if axis.spec.values else FloatDistribution(0.0, 1.0)
-                      for axis in space.axes}
+        self._axes: dict[str, BaseDistribution] = {
+            axis.name: CategoricalDistribution(range(len(axis.spec.values))) if axis.spec.values
+            else FloatDistribution(0.0, 1.0) for axis in space.axes}
 
     def run(self, runs: int) -> None:
         end = len(self._trials.outcomes) + runs
@@ -238,7 +243,7 @@ class _Exploration:
                 axis.name: int(shares[axis.name] * len(axis.spec.values)) if axis.spec.values
                 else float(shares[axis.name]) for axis in space.axes})
 
-    def _ask(self) -> tuple[Any, dict[str, object]]:
+    def _ask(self) -> tuple['Trial', dict[str, object]]:
         for _ in range(_ASKED):
             trial = self._study.ask(self._axes)
             variant = self._space.variant([
@@ -249,7 +254,7 @@ class _Exploration:
             self._study.tell(trial, state=self._failed)
         return trial, variant
 
-    def _tell(self, trial: Any, outcome: Outcome) -> None:
+    def _tell(self, trial: 'Trial', outcome: Outcome) -> None:
         if not outcome.is_known:
             self._study.tell(trial, state=self._failed)
             return

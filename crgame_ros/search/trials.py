@@ -4,7 +4,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell_batches import CellBatches
@@ -15,12 +14,14 @@ from crgame_ros.evaluation.evaluation import rows_of
 from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.evaluation.judging import shortfalls, worst_of
 from crgame_ros.evaluation.plan import EvaluationPlan
+from crgame_ros.evaluation.results.cell_rows import CellRows
 from crgame_ros.evaluation.results.parts import ResultParts, stored_rows
 from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.objects import Role
 from crgame_ros.search.settings import SearchSettings
 from crgame_ros.variation.space import Variant
+from distributed import Client
 
 # Variants that are run before any of their outcomes is told.
 _TOGETHER = 32
@@ -80,7 +81,7 @@ class Trials:
 
     def __init__(self, settings: SearchSettings, expectations: Sequence[Expectation],
                  place: EvaluationFolder, plan: EvaluationPlan, grid: CellGrid,
-                 parts: ResultParts, client: Any, limits: Limits,
+                 parts: ResultParts, client: Client, limits: Limits,
                  told: Callable[[Outcome, bool], object]) -> None:
         self._settings, self._expectations = settings, expectations
         self._place, self._plan, self._parts = place, plan, parts
@@ -88,8 +89,8 @@ class Trials:
         self._client, self._limits, self._told = client, limits, told
         self.outcomes: list[Outcome] = []
         self._by_text: dict[str, Outcome] = {}
-        self._earlier: dict[str, Any] = {
-            row['cell']: {'cell': row, 'vehicles': vehicles}
+        self._earlier: dict[str, CellRows] = {
+            str(row['cell']): {'cell': row, 'vehicles': vehicles}
             for row, vehicles in stored_rows(place.path)}
 
     @property
@@ -151,7 +152,7 @@ class Trials:
                 rows = [rows_of(cell, found) for cell, found in ended]
                 self._parts.add(*rows)
                 for row in rows:
-                    self._earlier[row['cell']['cell']] = row
+                    self._earlier[str(row['cell']['cell'])] = row
         for key, (text, variant) in zip(cells, new.items(), strict=True):
             # What is kept of a run is small: memory does not grow with the tables.
             outcome = self._outcome(key, variant, self._earlier.pop(key))
@@ -159,7 +160,7 @@ class Trials:
             self._by_text[text] = outcome
             self._told(outcome, key not in known)
 
-    def _outcome(self, key: str, variant: Variant, row: Mapping[str, Any]) -> Outcome:
+    def _outcome(self, key: str, variant: Variant, row: CellRows) -> Outcome:
         status = str(row['cell']['status'])
         vehicles = row['vehicles']
         broken = [line for each in self._expectations for line in shortfalls(each, vehicles)] \

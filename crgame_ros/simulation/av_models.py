@@ -35,8 +35,7 @@ def make_vehicle_model(spec: ModelSpec | None, vehicle: VehicleParameters,
     """
     if spec is None:
         return None
-    model: VehicleModel = VEHICLE_MODELS.create(spec.name, spec.options, where, vehicle=vehicle)
-    return model
+    return VEHICLE_MODELS.create(spec.name, spec.options, where, vehicle=vehicle)
 
 
 def make_execution(spec: AvSpec, vehicle: VehicleParameters,

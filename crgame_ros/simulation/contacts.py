@@ -4,7 +4,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypedDict
 
 from crgame_ros.drivability.collision import PERMANENT_OBSTACLE
 from crgame_ros.drivability.contact import could_avoid, Course, Kind, kind_of, Side, touched_side
@@ -22,6 +22,9 @@ from numpy.typing import NDArray
 _BRAKING, _REACTION_S = 8.0, 1.0
 _CANNOT_BRAKE = (Role.STATIC,)
 _DO_NOT_REACT = (Role.RECORDED, Role.SCRIPTED)
+ContactEntry = TypedDict('ContactEntry', {
+    'vehicle': str, 'with': str, 'n': int, 'side': str, 'kind': str, 'speed': float,
+    'other_speed': float, 'avoidable_by': str})
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ class Contact:
             able += f' ({self.other_role.value}: does not react)'
         return able
 
-    def as_dict(self) -> dict[str, object]:
+    def as_dict(self) -> ContactEntry:
         """Return its JSON form (`docs/planners.md`)."""
         return {'vehicle': self.vehicle_id, 'with': self.other_id, 'n': self.n,
                 'side': self.side, 'kind': self.kind, 'speed': round(self.speed, 2),

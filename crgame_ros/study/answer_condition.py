@@ -4,7 +4,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.declaration import Form
@@ -43,7 +43,7 @@ class AnswerTest:
         """Return the answers, of which it has to be one; empty if every answer is."""
         return self.one_of if self.equals is None else (self.equals,)
 
-    def holds(self, answer: Any) -> bool:
+    def holds(self, answer: object) -> bool:
         """Return whether an answer meets all tests that are given."""
         if answer is None or answer == []:
             return False
@@ -114,7 +114,7 @@ class AnswerCondition(QuestionTest):
         return self.text_of(self.field or self.question_told)
 
 
-def is_one_of(answer: Any, values: tuple[object, ...]) -> bool:
+def is_one_of(answer: object, values: tuple[object, ...]) -> bool:
     """
     Return whether an answer, or one of several that are chosen, is one of some values.
 
@@ -127,8 +127,8 @@ def is_one_of(answer: Any, values: tuple[object, ...]) -> bool:
     return any(not isinstance(value, bool) and answer == value for value in values)
 
 
-def holds_for(condition: AnswerCondition | None, answers: Mapping[str, Any],
-              fields: Mapping[str, Any]) -> bool:
+def holds_for(condition: AnswerCondition | None, answers: Mapping[str, object],
+              fields: Mapping[str, object]) -> bool:
     """
     Return whether a condition holds; None always does.
 

@@ -4,25 +4,24 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.answer_condition import Exclusion
 from crgame_ros.study.file import Block, Questions, StudyFile
-from crgame_ros.study.question import asked_of, Question
+from crgame_ros.study.question import Answer, asked_of, Question
 from crgame_ros.study.questionnaire import (
     load_questionnaire,
     questionnaire_name,
     questionnaire_of,
     questions_of,
 )
-from crgame_ros.study.session_journal import SessionEvent
+from crgame_ros.study.session_journal import JournalEntry, SessionEvent
 from crgame_ros.study.session_script import Fields, SessionItem
 from crgame_ros.study.staircase import ToldTrial, Track
 from crgame_ros.study.trial_plan import BlockStaircases, PlannedTrial
 
-Entries = Sequence[Mapping[str, Any]]
-Answers = Mapping[str, Any]
+Entries = Sequence[JournalEntry]
+Answers = Mapping[str, Answer]
 
 
 def judged_by(block: Block) -> str:
@@ -132,7 +131,7 @@ def _judged(study: StudyFile, block: Block, entries: Entries) -> dict[int, bool 
     """
     success, judging = block.judged, judging_question(study, block)
     assert success is not None
-    done: dict[str, Mapping[str, Any]] = {}
+    done: dict[str, JournalEntry] = {}
     for entry in entries:
         item = entry.get('item') or ''
         if entry['entry'] == SessionEvent.REPEATED:
@@ -148,7 +147,7 @@ def _judged(study: StudyFile, block: Block, entries: Entries) -> dict[int, bool 
         if entry['entry'] == SessionEvent.FINISHED:
             value = entry.get(success.drive or '') if judging is None else (
                 done.get(f'{name}/after/{judging[0]}', {}).get('answers') or {}).get(
-                    success.question)
+                    success.question or '')
         found[int(number)] = None if value in (None, []) else success.holds(value)
     return found
 
@@ -156,7 +155,7 @@ def _judged(study: StudyFile, block: Block, entries: Entries) -> dict[int, bool 
 def _told(study: StudyFile, block: Block, staircases: BlockStaircases,
           entries: Entries) -> dict[int, ToldTrial]:
     """Return what the journal tells of the trials of a block with staircases."""
-    started: dict[str, Any] = {}
+    started: dict[str, str | None] = {}
     driven: dict[int, tuple[int, int]] = {}
     for entry in entries:
         item = entry.get('item') or ''
@@ -165,11 +164,11 @@ def _told(study: StudyFile, block: Block, staircases: BlockStaircases,
             continue
         if entry['entry'] == SessionEvent.STARTED:
             started[item] = entry.get('condition')
-        elif entry['entry'] == SessionEvent.FINISHED and started.get(item) is not None:
+        elif entry['entry'] == SessionEvent.FINISHED and (name := started.get(item)) is not None:
             # A drive that did not finish has not decided anything: its level follows anew.
-            at = staircases.find(started[item])
+            at = staircases.find(name)
             if at is None:
-                raise InputError(f'tells of the condition "{started[item][:60]}", which is '
+                raise InputError(f'tells of the condition "{name[:60]}", which is '
                                  'not in the block', item, 'put back the study file that '
                                  'the session was run with')
             driven[int(number)] = at
@@ -178,7 +177,7 @@ def _told(study: StudyFile, block: Block, staircases: BlockStaircases,
             for place in sorted(driven.keys() | judged.keys()) if place <= staircases.most}
 
 
-def last_answers(entries: Iterable[Mapping[str, Any]]) -> dict[str, Answers]:
+def last_answers(entries: Iterable[JournalEntry]) -> dict[str, Answers]:
     """
     Return the last answers of each item, by its id; none of an item that is to be repeated.
 
@@ -233,7 +232,7 @@ def exclusion_of(study: StudyFile, items: Iterable[SessionItem],
 
 
 def _tested(study: StudyFile, rule: Exclusion, items: Iterable[SessionItem],
-            answers: Mapping[str, Answers]) -> Iterator[Any]:
+            answers: Mapping[str, Answers]) -> Iterator[Answer]:
     """Yield the answers that the condition of a rule is about."""
     when = rule.when
     assert when is not None

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Groups of participants: who takes part, and the places in groups and orders that are free."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 import fcntl
@@ -15,8 +15,8 @@ from crgame_ros.errors import InputError
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Within
 from crgame_ros.study.local_text import ColumnName
-from crgame_ros.study.question import ChoiceQuestion, Question
-from crgame_ros.study.session_journal import read_journal, SessionEvent
+from crgame_ros.study.question import Answer, ChoiceQuestion, Question
+from crgame_ros.study.session_journal import JournalEntry, read_journal, SessionEvent
 from crgame_ros.study.trial_order import shuffled
 from crgame_ros.study.trial_settings import Factor, Level
 
@@ -173,7 +173,7 @@ class Groups:
                              f'give as many as groups, and name choices as them: '
                              f'{", ".join(self.names)}')
 
-    def strata_of(self, answers: Mapping[str, Any]) -> dict[str, str]:
+    def strata_of(self, answers: Mapping[str, Answer]) -> dict[str, str]:
         """Return a participant's stratum of each field, by the field's name."""
         return {each.field: each.stratum_of(answers.get(each.field)) for each in self.strata}
 
@@ -195,7 +195,7 @@ class Allocation:
     slot: int | None = None
 
 
-def allocate(groups: Groups, seed: int, answers: Mapping[str, Any],
+def allocate(groups: Groups, seed: int, answers: Mapping[str, Answer],
              others: Sequence[Allocation], drawn_before: int, given: str | None = None
              ) -> Allocation:
     """
@@ -225,7 +225,7 @@ def allocate(groups: Groups, seed: int, answers: Mapping[str, Any],
                       strata, slot)
 
 
-def first_free(taken: set[Any]) -> int:
+def first_free(taken: Collection[object]) -> int:
     """Return the least number from 0 on that is not taken."""
     return next(number for number in range(len(taken) + 1) if number not in taken)
 
@@ -298,7 +298,7 @@ def read_enrolment(folder: Path) -> Enrolment | None:
     return found
 
 
-def allocation_of(entry: dict[str, object]) -> Allocation:
+def allocation_of(entry: JournalEntry) -> Allocation:
     """Return the allocation that a journal's entry holds."""
     strata, slot = entry.get('strata'), entry.get('slot')
     return Allocation(str(entry['group']), int(str(entry['place'])),

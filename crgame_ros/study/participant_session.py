@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 import time
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.answer_condition import Exclusion
@@ -27,9 +27,9 @@ from crgame_ros.study.groups import (
     enrolling,
     free_place,
 )
-from crgame_ros.study.question import asked_of, check_answers, Question
+from crgame_ros.study.question import Answer, asked_of, check_answers, Question
 from crgame_ros.study.questionnaire import questionnaire_of, questions_of
-from crgame_ros.study.session_journal import SessionEvent, SessionJournal
+from crgame_ros.study.session_journal import JournalEntry, SessionEvent, SessionJournal
 from crgame_ros.study.session_script import (
     Fields,
     is_driven,
@@ -102,7 +102,7 @@ class ParticipantSession:
             if begun is None:
                 self._add(SessionEvent.BEGUN, **mine, **({} if group is None else {
                     'group': group}), **({'members': self._members} if self._members else {}))
-        if begun is not None and {name: begun[name] for name in mine} != mine:
+        if begun is not None and {name: begun.get(name) for name in mine} != mine:
             raise self._other_plan()
         if allocated is not None:
             allocation = self.allocation = allocation_of(allocated)
@@ -130,7 +130,7 @@ class ParticipantSession:
         return InputError('began with another plan', str(self._folder),
                           'put the study file back, or name another participant')
 
-    def _check_given(self, group: str | None, begun: Mapping[str, Any] | None) -> None:
+    def _check_given(self, group: str | None, begun: JournalEntry | None) -> None:
         """Refuse other partners and a group where none is given, none where one is, or another."""
         together = self._members if begun is None else tuple(begun.get('members') or ())
         if together != self._members:
@@ -175,7 +175,7 @@ class ParticipantSession:
     def _awaits_group(self) -> bool:
         return self.study.groups is not None and self.allocation is None
 
-    def _allocate(self, fields: Mapping[str, Any]) -> None:
+    def _allocate(self, fields: Mapping[str, Answer]) -> None:
         groups = self.study.groups
         assert groups is not None
         given = next(entry.get('group') for entry in self.journal.entries
@@ -274,7 +274,7 @@ class ParticipantSession:
             else self.items
 
     @property
-    def fields(self) -> Mapping[str, Any]:
+    def fields(self) -> Mapping[str, Answer]:
         """Return the participant's answers to the fields."""
         return field_answers(self.items, last_answers(self.journal.entries))
 

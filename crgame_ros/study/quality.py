@@ -4,7 +4,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Within
@@ -59,7 +59,7 @@ class QualityBounds:
         """Return their JSON form."""
         return asdict(self)
 
-    def excesses(self, values: Mapping[str, Any], names: Mapping[str, 'Check']
+    def excesses(self, values: Mapping[str, object], names: Mapping[str, 'Check']
                  ) -> list['Excess']:
         """
         Return the values of a trial that are beyond their bounds.
@@ -70,12 +70,12 @@ class QualityBounds:
         found = []
         for name, check in names.items():
             value, bound = values.get(name), getattr(self, name)
-            if value is not None and bound is not None and (
+            if isinstance(value, int | float) and bound is not None and (
                     value < bound if check.least else value > bound):
                 found.append(Excess(name, check, value, bound))
         return found
 
-    def faults(self, values: Mapping[str, Any], names: Mapping[str, 'Check']) -> list[str]:
+    def faults(self, values: Mapping[str, object], names: Mapping[str, 'Check']) -> list[str]:
         """Return `excesses` as texts, one for each."""
         return [str(excess) for excess in self.excesses(values, names)]
 

@@ -5,7 +5,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 import math
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, TypeGuard
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.schema.declaration import Form
@@ -49,11 +49,10 @@ class LikertQuestion:
             raise InputError(f'has {len(self.labels)} labels for {self.points} points', '',
                              'give one for each point')
 
-    def refusal(self, answer: Any) -> str:
+    def refusal(self, answer: object) -> str:
         """Return why an answer is invalid, empty if it is valid."""
-        whole = isinstance(answer, int | float) and not isinstance(answer, bool) \
-            and answer == int(answer) if _finite(answer) else False
-        return '' if whole and 1 <= answer <= self.points else f'give 1 to {self.points}'
+        fits = _finite(answer) and answer == int(answer) and 1 <= answer <= self.points
+        return '' if fits else f'give 1 to {self.points}'
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,7 @@ class SliderQuestion:
         if not self.high > self.low:
             raise InputError(f'"high" is not above "low", {self.low:g}', '', 'give a higher one')
 
-    def refusal(self, answer: Any) -> str:
+    def refusal(self, answer: object) -> str:
         """Return why an answer is invalid, empty if it is valid."""
         fits = _finite(answer) and self.low <= answer <= self.high
         return '' if fits else f'give {self.low:g} to {self.high:g}'
@@ -111,7 +110,7 @@ class VasQuestion:
         """Return the least and the greatest answer."""
         return 0.0, 100.0
 
-    def refusal(self, answer: Any) -> str:
+    def refusal(self, answer: object) -> str:
         """Return why an answer is invalid, empty if it is valid."""
         return '' if _finite(answer) and 0.0 <= answer <= 100.0 else 'give 0 to 100'
 
@@ -177,7 +176,7 @@ class NumberQuestion:
         return (self.low if self.low > -_UNLIMITED else -math.inf,
                 self.high if self.high < _UNLIMITED else math.inf)
 
-    def refusal(self, answer: Any) -> str:
+    def refusal(self, answer: object) -> str:
         """Return why an answer is invalid, empty if it is valid."""
         fits = _finite(answer) and self.low <= answer <= self.high \
             and (not self.whole or answer == int(answer))
@@ -277,8 +276,8 @@ class Question:
         return self.kind.refusal(answer)
 
 
-def asked_of(questions: Sequence[Question], answers: Mapping[str, Any],
-             fields: Mapping[str, Any] | None = None) -> tuple[Question, ...]:
+def asked_of(questions: Sequence[Question], answers: Mapping[str, Answer],
+             fields: Mapping[str, Answer] | None = None) -> tuple[Question, ...]:
     """
     Return the questions whose conditions hold: those that the participant sees.
 
@@ -287,7 +286,7 @@ def asked_of(questions: Sequence[Question], answers: Mapping[str, Any],
     :param fields: of the participant; by default the questions are the fields themselves.
     """
     asked: list[Question] = []
-    taken: dict[str, Any] = {}
+    taken: dict[str, Answer] = {}
     for question in questions:
         if holds_for(question.when, taken, taken if fields is None else fields):
             asked.append(question)
@@ -296,7 +295,7 @@ def asked_of(questions: Sequence[Question], answers: Mapping[str, Any],
 
 
 def check_answers(questions: Sequence[Question], answers: Mapping[str, Any], where: str,
-                  fields: Mapping[str, Any] | None = None) -> dict[str, Answer]:
+                  fields: Mapping[str, Answer] | None = None) -> dict[str, Answer]:
     """
     Check the answers to some questions, and return them.
 
@@ -340,5 +339,5 @@ def check_conditions(questions: Sequence[Question], *, are_fields: bool) -> None
         earlier.append(question.name)
 
 
-def _finite(value: object) -> bool:
+def _finite(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -10,9 +10,10 @@ import json
 import os
 from pathlib import Path
 from types import TracebackType
-from typing import Any, IO, Self
+from typing import get_origin, get_type_hints, IO, Self, TypedDict
 
 from crgame_ros.errors import InputError, short
+from crgame_ros.study.question import Answer
 from crgame_ros.whole_file import sync_folder
 
 JOURNAL = 'journal.jsonl'
@@ -48,29 +49,31 @@ _NEEDED: dict[str, tuple[str, ...]] = {
     **dict.fromkeys((SessionEvent.STARTED, SessionEvent.FINISHED, SessionEvent.ABORTED,
                      SessionEvent.SKIPPED, SessionEvent.REPEATED, SessionEvent.PRACTISED),
                     ('item',))}
-# Types of values, which may be None as well; a float is any number.
-_TYPES: dict[str, type] = {
-    'at': float, 'entry': str,
-    **dict.fromkeys(('item', 'participant', 'language', 'run', 'name', 'text', 'reason',
-                     'outcome', 'group', 'page', 'condition'), str),
-    **dict.fromkeys(('attempt', 'place', 'contacts', 'departures', 'drives', 'slot'), int),
-    **dict.fromkeys(('time_s', 'end_time_s', 'start_at', 'asked_at', 'shown_at', 'answered_at',
-                     'taken_s', 'clean_s'), float),
-    **dict.fromkeys(('held', 'good'), bool),
-    **dict.fromkeys(('items', 'doubts', 'asked', 'members'), list),
-    **dict.fromkeys(('answers', 'software', 'after_s', 'quality', 'consent', 'strata'), dict)}
+
+# Values that are not there may be None as well; a float is any number.
+JournalEntry = TypedDict('JournalEntry', {  # noqa: UP013
+    'at': float, 'entry': str, 'item': str, 'participant': str, 'language': str, 'run': str,
+    'name': str, 'text': str, 'reason': str, 'outcome': str, 'group': str, 'page': str,
+    'condition': str, 'attempt': int, 'place': int, 'contacts': int, 'departures': int,
+    'drives': int, 'slot': int, 'time_s': float, 'end_time_s': float, 'start_at': float,
+    'asked_at': float, 'shown_at': float, 'answered_at': float, 'taken_s': float,
+    'clean_s': float, 'held': bool, 'good': bool, 'items': list[str], 'doubts': list[str],
+    'asked': list[str], 'members': list[str], 'answers': dict[str, Answer],
+    'software': dict[str, object], 'after_s': dict[str, object], 'quality': dict[str, object],
+    'consent': dict[str, object], 'strata': dict[str, object]}, total=False)
+_TYPES = {name: get_origin(kind) or kind for name, kind in get_type_hints(JournalEntry).items()}
 # Times of the wall clock are the largest numbers; until the year 5138 [s since 1970].
 _LARGEST = 1e11
 
 
-def read_entry(line: str | bytes) -> dict[str, object]:
+def read_entry(line: str | bytes) -> JournalEntry:
     """
     Read a line of a journal.
 
     :raises ValueError: if it lacks what entries of its kind need, or a value has another type.
     """
     try:
-        entry = json.loads(line)
+        entry: JournalEntry = json.loads(line)
     except RecursionError as error:
         raise ValueError('is no entry') from error
     if not isinstance(entry, dict):
@@ -147,7 +150,7 @@ class SessionJournal:
         """Close the file."""
         self._file.close()
 
-    def _recovered(self) -> Iterator[dict[str, Any]]:
+    def _recovered(self) -> Iterator[JournalEntry]:
         """Read the present entries, and remove a line that was cut off."""
         self._file.seek(0)
         content = self._file.read()
@@ -160,7 +163,7 @@ class SessionJournal:
                 yield read_entry(line)
 
 
-def read_journal(folder: Path) -> list[dict[str, Any]]:
+def read_journal(folder: Path) -> list[JournalEntry]:
     """
     Read a participant's entries, also while a process adds some.
 

@@ -4,7 +4,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Literal, TypeVar
 
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
@@ -18,6 +18,7 @@ from crgame_ros.study.trial_settings import tasks_over, TrialSettings
 from crgame_ros.yaml_text import read_yaml
 
 PERFECT, NONE = 'perfect', 'none'
+T = TypeVar('T')
 
 
 def seats_of(settings: TrialSettings, game: Game) -> tuple[str, ...]:
@@ -107,7 +108,7 @@ def _written_game(settings: TrialSettings) -> Game:
     return Game(scenario, humans=humans)
 
 
-def _spec(kind: type[object], name: str | None, nothing: str, what: str) -> Any:
+def _spec(kind: type[T], name: str | None, nothing: str, what: str) -> T | Literal['own'] | None:
     if name in (None, OWN):
         return OWN
     if name == nothing:

@@ -11,7 +11,6 @@ from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from itertools import accumulate
 import math
-from typing import Any
 
 from crgame_ros.errors import CrgameError, InputError
 import numpy as np
@@ -150,7 +149,7 @@ class TimingSummary:
     busy_p50_ms: float
     busy_p99_ms: float
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the keys of `timing.json`: those of table I first, in its order."""
         values: dict[str, object] = dict(vars(self))
         values['real_time_ratio'] = dict(vars(self.real_time_ratio))

@@ -10,6 +10,7 @@ are the values of the distribution functions, so that the stated distributions a
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 import math
+from pathlib import Path
 from statistics import NormalDist
 from typing import Any
 
@@ -220,14 +221,13 @@ class VariantSpace:
 
         :raises InputError: if a key of it cannot be set.
         """
-        values: Any = self.values
+        values = dict(self.values)
         for path, source, place in self._set:
             value = source.value(variant) if isinstance(source, Expression) else variant[source]
             values = with_value(values, path, value, place)
-        made: dict[str, object] = values
-        return made
+        return values
 
-    def check(self, base: Any, where: str) -> None:
+    def check(self, base: Path, where: str) -> None:
         """
         Check that the game can be read with each value at the ends of its range.
 
@@ -269,7 +269,7 @@ def game_of(game: Game, variant: Variant, where: str) -> Game:
     return parse_game(space.game_values(variant), where, game.base)
 
 
-def _value_at(values: Any, path: str) -> object:
+def _value_at(values: object, path: str) -> object:
     """
     Return the value of a key; None where it is not given.
 
@@ -284,11 +284,10 @@ def _value_at(values: Any, path: str) -> object:
             values = None if place is None else values[place]
         else:
             return None
-    found: object = values
-    return found
+    return values
 
 
-def with_value(values: Any, path: str, value: object, where: str = '') -> Any:
+def with_value(values: object, path: str, value: object, where: str = '') -> Any:
     """
     Return values with a key changed or added; what is not on its path is shared.
 
@@ -310,14 +309,14 @@ def with_value(values: Any, path: str, value: object, where: str = '') -> Any:
     return values | {name: with_value(values.get(name), rest, value, where) if rest else value}
 
 
-def _place(entries: list[Any], name: str) -> int | None:
+def _place(entries: list[object], name: str) -> int | None:
     for index, entry in enumerate(entries):
         if isinstance(entry, dict) and name in (entry.get(key) for key in _NAMES):
             return index
     return int(name) if name.isdecimal() and int(name) < len(entries) else None
 
 
-def _names_of(entries: list[Any]) -> list[str]:
+def _names_of(entries: list[object]) -> list[str]:
     return [next((str(entry[key]) for key in _NAMES if isinstance(entry, dict) and key in entry),
                  str(index)) for index, entry in enumerate(entries)]
 
@@ -405,6 +404,5 @@ def _points(sampling: Sampling, dimensions: int, seed: int) -> Callable[[int], P
     engine = {'sobol': qmc.Sobol, 'lhs': qmc.LatinHypercube}[sampling](dimensions, rng=seed)
 
     def draw(number: int) -> Points:
-        points: Points = engine.random(number)
-        return points
+        return engine.random(number)
     return draw

@@ -4,7 +4,7 @@
 
 from collections.abc import Callable
 import math
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ class IdmParameters(NamedTuple):
 
 
 def free_acceleration(speed: Number, desired: Number, model: IdmParameters,
-                      larger: Callable[[Any, Any], Any] = max) -> Number:
+                      larger: Callable[..., Number] = max) -> Number:
     """
     Return the free-road acceleration a (1 - (v / v0)^4); not below -b where v exceeds v0 [m/s^2].
 
@@ -46,7 +46,7 @@ def free_acceleration(speed: Number, desired: Number, model: IdmParameters,
 
 
 def interaction(speed: Number, gap: Number, leader_speed: Number, model: IdmParameters,
-                larger: Callable[[Any, Any], Any] = max) -> Number:
+                larger: Callable[..., Number] = max) -> Number:
     """
     Return the interaction term -a (s* / s)^2 of the IDM (CRG reference 10) [m/s^2].
 

@@ -71,8 +71,7 @@ class Placement(NamedTuple):
 
     def point(self, x: float, y: float) -> list[float]:
         """Return where a point of the map comes to lie."""
-        placed: list[float] = (self.turned @ (x, y) + self.offset).tolist()
-        return placed
+        return (self.turned @ (x, y) + self.offset).tolist()
 
     def yaw(self, yaw: float) -> float:
         """Return where a direction of the map comes to point."""
@@ -103,7 +102,7 @@ def write_copy(game: Path, place: Placement, folder: Path) -> Path:
     return path
 
 
-def _values(game: Game, place: Placement, where: str) -> dict[str, Any]:
+def _values(game: Game, place: Placement, where: str) -> dict[str, object]:
     """Return the values of a game without relative file names."""
     if game.occupancy is not None and place.added == 0:
         raise InputError('its map of obstacles cannot be placed anew', where, 'test it as it is')
@@ -111,8 +110,7 @@ def _values(game: Game, place: Placement, where: str) -> dict[str, Any]:
                               for human in game.humans):
         raise InputError('its driver cannot be mirrored', where, 'test it as it is')
     # Expressions of what varies are not placed anew.
-    values: dict[str, Any] = write(replace(game, vary=()), game.base)
-    return values
+    return write(replace(game, vary=()), game.base)
 
 
 def placed(values: Any, place: Placement) -> Any:
@@ -121,19 +119,21 @@ def placed(values: Any, place: Placement) -> Any:
         return [placed(each, place) for each in values]
     if not isinstance(values, dict):
         return values
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
+    side = -1.0 if place.mirrored else 1.0
     for key, value in values.items():
         if key == 'at' and isinstance(value, list):
             found[key] = [*place.point(*value[:2]), *map(place.yaw, value[2:])]
         elif key == 'path' and isinstance(value, list):
             found[key] = [place.point(*each) for each in value]
         elif key == 'trajectory' and isinstance(value, list):
-            found[key] = [[t, *place.point(x, y), *map(place.yaw, yaw)]
-                          for t, x, y, *yaw in value]
+            found[key] = [[t, *place.point(x, y), *map(place.yaw, yaw)] for t, x, y, *yaw in value]
         elif key == 'd' and place.mirrored:
             found[key] = -value
         elif key == 'sensors':
-            found[key] = [_mounted(each, place) for each in value]
+            # They are on their vehicle: only left and right may change.
+            found[key] = [{name: side * part if name in ('y', 'yaw') else part
+                           for name, part in each.items()} for each in value]
         elif key in _ID and isinstance(value, int):
             found[key] = value + place.added
         elif key in _IDS:
@@ -149,13 +149,7 @@ def placed(values: Any, place: Placement) -> Any:
     return found
 
 
-def _mounted(sensor: dict[str, Any], place: Placement) -> dict[str, Any]:
-    """Return a sensor, which is on its vehicle: only left and right may change."""
-    side = -1.0 if place.mirrored else 1.0
-    return {key: side * value if key in ('y', 'yaw') else value for key, value in sensor.items()}
-
-
-def _renamed(value: Any, place: Placement) -> Any:
+def _renamed(value: object, place: Placement) -> object:
     """Return ids of objects, of which o30 is the scenario's obstacle 30."""
     if isinstance(value, list):
         return [_renamed(each, place) for each in value]

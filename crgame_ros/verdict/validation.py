@@ -8,7 +8,6 @@ import json
 import math
 from pathlib import Path
 import re
-from typing import Any
 
 from crgame_ros.errors import CrgameError, InputError, one_line
 from crgame_ros.game.game import Game
@@ -85,7 +84,7 @@ def journal_faults(path: Path) -> tuple[int, list[str]]:
         faults.append(f'{path}: its last line was cut off; the next start of the session drops it')
     for number, line in enumerate(lines, 1):
         try:
-            entry: Any = json.loads(line)
+            entry = json.loads(line)
             kind, at = entry['entry'], entry['at']
             if not isinstance(kind, str) or not math.isfinite(at):
                 raise ValueError('entry or time')

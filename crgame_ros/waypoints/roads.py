@@ -4,12 +4,12 @@
 
 from collections.abc import Collection, Mapping
 import csv
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 import io
 import math
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple, TextIO
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.roads.network import RoadNetwork
@@ -92,8 +92,7 @@ class WaypointRoads:
     :raises InputError: if there is no lane, or a link names one that does not exist.
     """
 
-    def __init__(self, lanes: Mapping[int, WaypointLane],
-                 links: Mapping[int, LaneLinks]) -> None:
+    def __init__(self, lanes: Mapping[int, WaypointLane], links: Mapping[int, LaneLinks]) -> None:
         if not lanes:
             raise InputError('there is no lane', 'way-point roads', 'give one at least')
         self._lanes = dict(lanes)
@@ -133,7 +132,7 @@ class WaypointRoads:
             except InputError as error:
                 raise InputError(error.what, f'{path}, line {entry.line}, lane {lane}',
                                  error.remedy) from error
-            links[lane] = LaneLinks(**entry.links)
+            links[lane] = entry.links
             missing = [other for other in links[lane].named if other not in rows]
             if missing:
                 raise InputError(f'lane {lane} is linked with lane {missing[0]}, which does not '
@@ -145,7 +144,7 @@ class WaypointRoads:
     def to_csv(self, path: Path) -> None:
         """Write the way-points so that `from_csv` gives the same roads to the last bit."""
         _write_lane_rows(path, {
-            lane: LaneRows(0, road.rows, vars(self._links[lane]))
+            lane: LaneRows(0, road.rows, self._links[lane])
             for lane, road in self._lanes.items()})
 
     def only(self, lane_ids: Collection[int]) -> 'WaypointRoads':
@@ -248,12 +247,11 @@ class LaneRows:
 
     :param line: line number of its first row.
     :param points: (W, 4) x [m], y [m], width [m], speed limit [m/s]
-    :param links: successors, predecessors, left, … as in `LaneLinks`.
     """
 
     line: int
     points: FloatArray
-    links: dict[str, Any] = field(default_factory=dict)
+    links: LaneLinks = LaneLinks()
 
 
 def _read_lane_rows(path: Path) -> dict[int, LaneRows]:
@@ -267,7 +265,7 @@ def _read_lane_rows(path: Path) -> dict[int, LaneRows]:
             raise InputError(f'is larger than {MAX_BYTES >> 20} MiB', str(path),
                              'thin out the way-points, or split the map')
         with path.open(encoding='utf-8-sig', newline='') as file:
-            return _parse(csv.reader(file, strict=True), str(path))
+            return _parse(file, str(path))
     except OSError as error:
         raise InputError(f'cannot read the way-points ({error.strerror})', str(path),
                          'check the name') from error
@@ -275,11 +273,12 @@ def _read_lane_rows(path: Path) -> dict[int, LaneRows]:
         raise InputError(f'is no CSV ({error})', str(path), 'save it as CSV in UTF-8') from error
 
 
-def _parse(reader: Any, path: str) -> dict[int, LaneRows]:
+def _parse(file: TextIO, path: str) -> dict[int, LaneRows]:
+    reader = csv.reader(file, strict=True)
     columns = _header(next(reader, []), path)
     points: dict[int, list[list[float]]] = {}
     first: dict[int, int] = {}
-    links: dict[int, dict[str, Any]] = {}
+    links: dict[int, LaneLinks] = {}
     current = None
     for count, row in enumerate(row for row in reader if any(cell.strip() for cell in row)):
         where = f'{path}, line {reader.line_num}'
@@ -347,13 +346,11 @@ def _id(text: str, where: str) -> int:
     return int(text)
 
 
-def _links(cells: Mapping[str, str], where: str) -> dict[str, object]:
-    links: dict[str, object] = {
-        name: tuple(_id(item, where) for item in cells.get(name, '').split()) for name in _LISTS}
-    for name in _SINGLE:
-        text = cells.get(name, '')
-        links[name] = _id(text, where) if text else None
-    return links
+def _links(cells: Mapping[str, str], where: str) -> LaneLinks:
+    successors, predecessors = (
+        tuple(_id(item, where) for item in cells.get(name, '').split()) for name in _LISTS)
+    return LaneLinks(successors, predecessors, *(
+        _id(text, where) if (text := cells.get(name, '')) else None for name in _SINGLE))
 
 
 def _write_lane_rows(path: Path, lanes: Mapping[int, LaneRows]) -> None:
@@ -366,8 +363,8 @@ def _write_lane_rows(path: Path, lanes: Mapping[int, LaneRows]) -> None:
     writer = csv.writer(text, lineterminator='\n')
     writer.writerow(('lane', *_NUMBERS, *_LISTS, *_SINGLE))
     for lane, entry in lanes.items():
-        links = [' '.join(map(str, entry.links[name])) for name in _LISTS]
-        links += ['' if entry.links[name] is None else str(entry.links[name])
+        links = [' '.join(map(str, getattr(entry.links, name))) for name in _LISTS]
+        links += ['' if (beside := getattr(entry.links, name)) is None else str(beside)
                   for name in _SINGLE]
         for row in entry.points.tolist():
             limit = row[3] if math.isfinite(row[3]) else ''

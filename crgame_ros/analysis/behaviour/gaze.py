@@ -200,9 +200,7 @@ def _seen_in(mirror: ShownName, names: list[ShownName], ranks: FloatArray) -> in
 def _least(ranks: FloatArray) -> NDArray[np.int64]:
     """Return the column with the least rank (S); -1 where all are infinite."""
     columns = np.argmin(ranks, axis=1)
-    found: NDArray[np.int64] = np.where(
-        np.isfinite(ranks[np.arange(len(ranks)), columns]), columns, -1)
-    return found
+    return np.where(np.isfinite(ranks[np.arange(len(ranks)), columns]), columns, -1)
 
 
 def _beside_deg(x: FloatArray, y: FloatArray, boxes: FloatArray, eye: FloatArray) -> FloatArray:
@@ -214,9 +212,7 @@ def _beside_deg(x: FloatArray, y: FloatArray, boxes: FloatArray, eye: FloatArray
     left, top, right, bottom = np.moveaxis(boxes, -1, 0)
     dx = np.maximum(np.maximum(left - x[:, None], x[:, None] - right), 0.0)
     dy = np.maximum(np.maximum(top - y[:, None], y[:, None] - bottom), 0.0)
-    angles: FloatArray = np.degrees(np.arctan(np.hypot(
-        2.0 * eye[_ACROSS] * dx, 2.0 * eye[_TALL] * dy)))
-    return angles
+    return np.degrees(np.arctan(np.hypot(2.0 * eye[_ACROSS] * dx, 2.0 * eye[_TALL] * dy)))
 
 
 def _find_road(found: LookedAt, group: NDArray[np.int64], eyes: FloatArray, margin: float,

@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finds the moments of a run that figures and reports show."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 import math
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
 from crgame_ros.recording.run_record import RunRecord
+from crgame_ros.simulation.contacts import ContactEntry
 
 # Moments this close to each other are merged [s].
 TOGETHER_S = 1.0
@@ -61,7 +62,7 @@ class Touch(NamedTuple):
     n: int
 
     @classmethod
-    def from_entry(cls, entry: Mapping[str, Any]) -> 'Touch':
+    def from_entry(cls, entry: ContactEntry) -> 'Touch':
         """Read one."""
         return cls(entry['vehicle'], entry['with'], entry['n'])
 

@@ -4,7 +4,6 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import CHIEF, MEASURES
 from crgame_ros.analysis.report.document import Article, Page
@@ -40,6 +39,8 @@ from crgame_ros.errors import InputError
 from crgame_ros.software import software
 from crgame_ros.vehicle.state import StateColumn
 from crgame_ros.whole_file import write_text
+import numpy as np
+from numpy.typing import NDArray
 
 # The sections of a run's report, in order; a new section is added here.
 SECTIONS: tuple[Callable[[Run], Section | None], ...] = (
@@ -168,15 +169,14 @@ def _rows() -> Iterator[tuple[str, Callable[[Run], str]]]:
     yield 'time below the threshold of TTC [s]', lambda run: number(sum(
         each.exposures['tet_s'] for each in run.usual_criticality.report()))
     yield 'least PET [s]', _least_pet
-    yield 'contacts', lambda run: NOTHING if run.contacts is None \
-        else str(len(run.contacts))
+    yield 'contacts', lambda run: NOTHING if run.contacts is None else str(len(run.contacts))
     yield 'violations', lambda run: NOTHING if run.outcome is None \
         else str(run.outcome['drivability']['violations'])
     yield 'events that took effect', lambda run: str(len(run.record.fired))
     yield 'plans accepted', accepted
     yield 'worst latency p99 [ms]', _latency
-    yield 'greatest cumulative error [ms]', lambda run: _format_value(
-        run, lambda timing: number(timing['max_cumulative_error_ms'], 1))
+    yield 'greatest cumulative error [ms]', lambda run: NOTHING \
+        if run.timing is None else number(run.timing['max_cumulative_error_ms'], 1)
 
 
 def _worst_of_all(run: Run, name: str) -> str:
@@ -195,10 +195,6 @@ def accepted(run: Run) -> str:
     due = sum(found.due for found in run.answers.values())
     driven = sum(found.driven for found in run.answers.values())
     return f'{driven} of {due} ({share(driven, due)})' if due else NOTHING
-
-
-def _format_value(run: Run, say: Callable[[Any], str]) -> str:
-    return NOTHING if run.timing is None else say(run.timing)
 
 
 def _least_pet(run: Run) -> str:
@@ -225,7 +221,8 @@ def _plots(runs: Sequence[Run]) -> Iterator[Plot]:
 
 
 def _plot(runs: Sequence[Run], key: str, words: str, unit: str,
-          values: Callable[[Run, int], Any], bounds: tuple[float, float] | None) -> Plot:
+          values: Callable[[Run, int], NDArray[np.float64]],
+          bounds: tuple[float, float] | None) -> Plot:
     lines = [PlotLine(f'{letter(place)} {item.id}', run.times_s, values(run, i),
                       _COLOURS[place % len(_COLOURS)], _DASHES[i % len(_DASHES)])
              for place, run in enumerate(runs) for i, item in enumerate(run.log.vehicles)]

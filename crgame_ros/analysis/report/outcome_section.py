@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What happened in a run: events, contacts, traffic rules, and how critical it was."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 from crgame_ros.analysis.criticality.criticality import (
     CHIEF,
@@ -60,13 +59,12 @@ def _contacts(run: Run) -> str:
         'vehicle', 'touched', 'at [s]', 'kind', 'speed [m/s]', "other's [m/s]",
         'avoidable by'), [
             (named(run, item['vehicle']), named(run, item['with']),
-             moment(run, _time_s(run, item)), free(item['kind']),
+             moment(run, _time_s(run, item['n'])), free(item['kind']),
              number(item['speed']), number(item['other_speed']), free(item['avoidable_by']))
             for item in contacts], 'numbers')
 
 
-def _time_s(run: Run, item: Mapping[str, Any]) -> float | None:
-    n = item['n']
+def _time_s(run: Run, n: int | None) -> float | None:
     return None if n is None else n * run.log.game.scheduler.dt_s
 
 
@@ -78,7 +76,7 @@ def _violations(run: Run) -> str:
         return note('No vehicle left the road or broke a rule that was checked.')
     return table('Violations, when each began', ('vehicle', 'what', 'at [s]'), [
         (named(run, item['vehicle']), free(item['what']),
-         NOTHING if item['n'] is None else moment(run, _time_s(run, item)))
+         NOTHING if item['n'] is None else moment(run, _time_s(run, item['n'])))
         for item in found], 'numbers')
 
 
@@ -149,8 +147,7 @@ def criticality_section(run: Run) -> Section:
     return Section('criticality', 'Criticality', html, tuple(_plots(run, limits)))
 
 
-def _worst(run: Run, vehicle: VehicleCriticality,
-           limits: Thresholds) -> Iterator[Sequence[str]]:
+def _worst(run: Run, vehicle: VehicleCriticality, limits: Thresholds) -> Iterator[Sequence[str]]:
     for name, measure in MEASURES.items():
         worst = vehicle.worst.get(name)
         if worst is None or name == TWICE or not measure.matters(worst.value):

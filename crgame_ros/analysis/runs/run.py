@@ -2,24 +2,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """A finished run, for reports, tables and figures: all that is known and measured of it."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal, Self, TYPE_CHECKING
+from typing import Literal, Self, TYPE_CHECKING
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.documents import DrivenVehicle, GameDocument
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.instrument_streams import read_streams, RecordedStream
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.recorded_plans import PlanOutcome, plans_of_report
+from crgame_ros.recording.recorded_plans import PlanOutcome, plans_of_report, RunReport
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.run_folder import recording_in, run_name
 from crgame_ros.recording.run_record import record_of_log, run_record_of, RunRecord
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
 from crgame_ros.recording.timing_report import offline_outcome, timing_report
+from crgame_ros.simulation.contacts import ContactEntry
 from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,7 @@ class Run:
 
     def __init__(self, name: str, *, bag: Path | None = None, epoch: int | None = None,
                  log: RunTrajectories | None = None, record: RunRecord | None = None,
-                 timing: Mapping[str, object] | None = None, result: OfflineResult | None = None,
+                 timing: RunReport | None = None, result: OfflineResult | None = None,
                  scoring: Scoring = 'all', progress: RunProgress = _silent) -> None:
         """
         Keep what is known; the rest follows from the recording, or from an offline run's result.
@@ -183,7 +184,7 @@ class Run:
         return np.asarray(self.steps_of(ks) * self.game.scheduler.dt_s)
 
     @cached_property
-    def _timed(self) -> tuple[Mapping[str, Any] | None, tuple[str, ...]]:
+    def _timed(self) -> tuple[RunReport | None, tuple[str, ...]]:
         """Return the content of `timing.json`, or why there is none."""
         if self._known_timing is not None or self.bag is None:
             return self._known_timing, ()
@@ -194,17 +195,17 @@ class Run:
             return None, (str(error),)
 
     @property
-    def timing(self) -> Mapping[str, Any] | None:
+    def timing(self) -> RunReport | None:
         """Return the content of `timing.json`; None if offline or without recorded cycles."""
         return self._timed[0]
 
     @cached_property
-    def outcome(self) -> Mapping[str, Any] | None:
+    def outcome(self) -> RunReport | None:
         """Return planners, violations and contacts as in `timing.json`; None if unknown."""
         return self.timing if self._result is None else offline_outcome(self._result)
 
     @property
-    def contacts(self) -> Sequence[Mapping[str, Any]] | None:
+    def contacts(self) -> Sequence[ContactEntry] | None:
         """Return the first contacts as in `timing.json`; None if unknown."""
         return None if self.outcome is None else self.outcome['contacts']
 
@@ -266,8 +267,7 @@ class Run:
         if self.bag is None:
             return None
         from crgame_ros.recording.recorded_plans import read_plans
-        return partial(read_plans, self.bag, self.game.epoch,
-                       self.telling('reading the plans of'))
+        return partial(read_plans, self.bag, self.game.epoch, self.telling('reading the plans of'))
 
     def measure(self, on_tick: 'Callable[[Criticality], object]' = lambda _: None,
                 ) -> 'Criticality':

@@ -8,7 +8,7 @@ from importlib.metadata import version
 from itertools import chain
 import math
 import re
-from typing import Any, NamedTuple, TYPE_CHECKING
+from typing import NamedTuple, TYPE_CHECKING
 
 from commonroad.common.solution import CostFunction, VehicleType
 from commonroad.planning.planning_problem import PlanningProblem
@@ -102,7 +102,7 @@ class _AlongLanes(NamedTuple):
     """A trajectory in the coordinates of its lanes, and what cost functions ask of these."""
 
     trajectory: Trajectory
-    properties: dict[Any, Any]
+    properties: dict[object, object]
 
 
 def _along_lanes(matcher: 'LaneletRouteMatcher', trajectory: Trajectory,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import json
 import math
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
@@ -43,8 +43,7 @@ class Column:
     @property
     def kind(self) -> str:
         """Return the name of its type in Table Schemas: number, integer, string or boolean."""
-        return {NUMBER: 'number', INTEGER: 'integer', TEXT: 'string',
-                FLAG: 'boolean'}[self.type]
+        return {NUMBER: 'number', INTEGER: 'integer', TEXT: 'string', FLAG: 'boolean'}[self.type]
 
     @property
     def notes(self) -> dict[str, str]:
@@ -128,13 +127,13 @@ def declare(name: str, row: str, key: tuple[str, ...],
     return TableDeclaration(name, row, key, (column for part in parts for column in part.columns))
 
 
-def part_rows(parts: Sequence[TablePart], run: 'Run') -> dict[str, Any]:
+def part_rows(parts: Sequence[TablePart], run: 'Run') -> dict[str, Sequence[object]]:
     """
     Return all columns of a run's rows.
 
     :raises ValueError: if a part has other rows than the first, or a column of another part.
     """
-    found: dict[str, Any] = {}
+    found: dict[str, Sequence[object]] = {}
     for part in parts:
         values = part.values(run)
         names = {column.name for column in part.columns}

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables of criticality: the measures of each pair at each step, and crossings."""
 
-from typing import Any
 
 from crgame_ros.analysis.criticality.car_following_measures import NO_LEADER
 from crgame_ros.analysis.criticality.criticality import (
@@ -22,6 +21,7 @@ from crgame_ros.analysis.tables.column import (
 )
 from crgame_ros.analysis.tables.writer import TableRows
 import numpy as np
+from numpy.typing import NDArray
 import pyarrow as pa
 
 FOOTPRINTS = 'footprints, bumper to bumper'
@@ -93,8 +93,8 @@ class _Collected:
         self._run, self._pairs = run, pairs
         self._ids: pa.Array | None = None
         self._steps: list[tuple[int, int, int]] = []
-        self._others: list[Any] = []
-        self._values: list[Any] = []
+        self._others: list[NDArray[np.int64]] = []
+        self._values: list[NDArray[np.float64]] = []
         self._rows = 0
 
     def add(self, criticality: Criticality) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 import json
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 from crgame_ros.analysis.runs.run import Run, RunProgress, Scoring
 from crgame_ros.analysis.tables.behaviour import BEHAVIOUR_TABLES, write_behaviour
@@ -130,7 +130,7 @@ def _earlier(out: Path) -> set[str]:
     """Return the names of an earlier export's files in a folder; empty without one."""
     try:
         with (out / PACKAGE_FILE).open('rb') as stream:
-            package: Any = json.loads(stream.read(_LARGEST_PACKAGE))
+            package = json.loads(stream.read(_LARGEST_PACKAGE))
         if not str(package['createdBy']).startswith(CREATOR):
             return set()
         files = {str(resource['path']) for resource in package['resources']}

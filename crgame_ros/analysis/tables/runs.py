@@ -5,6 +5,7 @@
 from collections.abc import Mapping, Sequence
 import hashlib
 import json
+from typing import Any
 
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
@@ -64,7 +65,7 @@ def _identity(run: Run) -> Mapping[str, Sequence[object]]:
 
 
 def _timing(run: Run) -> Mapping[str, Sequence[object]]:
-    timing = run.timing
+    timing: Mapping[str, Any] | None = run.timing
     found: dict[str, Sequence[object]] = {} if timing is None else {
         **{name: [timing[key] * factor] for key, (name, _, factor, _) in TIMING.items()},
         **{f'real_time_ratio_{key}': [timing['real_time_ratio'][key]] for key in RATIOS},

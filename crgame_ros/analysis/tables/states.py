@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of states: all vehicles and objects at each scenario step, and drivers' inputs."""
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Mapping
 
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
@@ -184,10 +183,10 @@ class _StateRows:
                 'lane_s': s, 'lane_offset': offset}
 
 
-def _consumed(commands: FloatArray) -> dict[str, object]:
+def _consumed(commands: FloatArray) -> Mapping[str, object]:
     """Return the columns of the commands consumed (R, 5)."""
     # Putting a vehicle back is an event (`events`).
-    found: dict[str, Any] = {name: column for name, column in zip(
+    found = {name: column for name, column in zip(
         COMMAND_COLUMNS, commands.T, strict=True) if name != 'put_back'}
     shown, reverse = found.pop('lights'), found['reverse']
     lights = np.nan_to_num(shown).astype(int)

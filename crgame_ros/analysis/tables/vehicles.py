@@ -4,7 +4,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.analysis.criticality.criticality import EXPOSURES, MEASURES
 from crgame_ros.analysis.criticality.headways import LEAST_SPEED, SHORT_S
@@ -155,8 +155,7 @@ def _criticality(run: Run) -> Mapping[str, Sequence[object]]:
         worst = [None if each is None else each.worst.get(name) for each in found]
         columns[f'worst_{name}'] = [None if each is None else each.value for each in worst]
         columns[f'worst_{name}_of'] = [None if each is None else each.other for each in worst]
-        columns[f'worst_{name}_time_s'] = [None if each is None else each.time_s
-                                           for each in worst]
+        columns[f'worst_{name}_time_s'] = [None if each is None else each.time_s for each in worst]
     columns['max_inverse_ttc'] = [
         None if each is None else 0.0 if (least := each.worst.get('ttc')) is None
         else 1.0 / max(least.value, LEAST_TTC_S) for each in found]
@@ -172,7 +171,7 @@ def _following(run: Run) -> Mapping[str, Sequence[object]]:
     found = [run.vehicle_criticality.get(item.id) for item in run.log.vehicles]
     columns: dict[str, list[object]] = {column.name: [] for column in FOLLOWING_COLUMNS}
     for each in found:
-        row: dict[str, Any] = dict.fromkeys(columns)
+        row: dict[str, float | None] = dict.fromkeys(columns)
         if each is not None:
             headways = each.headways
             row['share_following'] = headways.share_following()

@@ -3,12 +3,12 @@
 """Writes one table's file in pieces, so that memory does not grow with the run's length."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 import csv
 import math
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Literal, Self, TypeGuard
 
 from crgame_ros.analysis.tables.column import NUMBER, TableDeclaration, TEXT
 import pyarrow as pa
@@ -29,7 +29,7 @@ class TableRows(ABC):
         self.declaration = declaration
         self.rows = 0
 
-    def add(self, columns: Mapping[str, Any]) -> None:
+    def add(self, columns: Mapping[str, object]) -> None:
         """
         Add rows.
 
@@ -70,11 +70,11 @@ class KeptTable(TableRows):
         return pa.Table.from_batches(self._kept, self.declaration.schema).combine_chunks()
 
 
-def _are_many(values: object) -> bool:
+def _are_many(values: object) -> TypeGuard[Collection[object]]:
     return hasattr(values, '__len__') and not isinstance(values, str)
 
 
-def _array(values: Any, kind: pa.DataType, rows: int) -> pa.Array:
+def _array(values: object, kind: pa.DataType, rows: int) -> pa.Array:
     """Return a column's values in its type; NaN becomes missing."""
     if values is None:
         return pa.nulls(rows, kind)
@@ -175,7 +175,7 @@ class TableWriter(TableRows):
 
 def _spelled(column: pa.Array) -> list[object]:
     """Return a column's values as in CSV."""
-    values: list[Any] = column.to_pylist()
+    values = column.to_pylist()
     if column.type == NUMBER:
         # Full precision, always with a point or an exponent, so that none looks like an integer.
         return [NOT_A_NUMBER if value is None

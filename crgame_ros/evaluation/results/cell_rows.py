@@ -3,7 +3,7 @@
 """The rows of a cell in the tables, and the tables' declarations."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypedDict
 
 from crgame_ros.analysis.blame.blame import blame_of, KINDS
 from crgame_ros.analysis.runs.run import Run
@@ -76,6 +76,14 @@ WORK = TableDeclaration('work', 'the computing of a cell', ('cell',), (
 TABLES_OF_CELLS = (CELLS, VEHICLES_OF_CELLS, WORK)
 
 
+class CellRows(TypedDict, total=False):
+    """The rows of a cell in the tables of an evaluation; a cell that failed may lack some."""
+
+    cell: dict[str, object]
+    vehicles: list[dict[str, object]]
+    work: dict[str, Any]
+
+
 def outcome_of(result: OfflineResult, contacts: Sequence[Contact]) -> dict[str, object]:
     """
     Return the values of a run in the cell's row.
@@ -95,11 +103,11 @@ def vehicle_rows(run: Run, result: OfflineResult,
 
     :param contacts: of the run.
     """
-    columns: dict[str, Sequence[Any]] = part_rows(VEHICLE_PARTS, run)
+    columns: dict[str, Sequence[object]] = part_rows(VEHICLE_PARTS, run)
     ids = columns.pop('id')
     del columns['run']
     rows = []
-    for place, vehicle in enumerate(ids):
+    for place, vehicle in enumerate(map(str, ids)):
         verdicts = [item for item in result.violations if item.vehicle_id == vehicle]
         record = result.planners.get(vehicle)
         collided = any(item.collision for item in verdicts)

@@ -11,12 +11,13 @@ import os
 from pathlib import Path
 import time
 from types import TracebackType
-from typing import Any, IO, Self
+from typing import IO, Self
 
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.analysis.tables.writer import TableWriter
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.results.cell_rows import (
+    CellRows,
     CELLS,
     TABLES_OF_CELLS,
     VEHICLES_OF_CELLS,
@@ -85,7 +86,7 @@ class ResultParts:
                              'wait for it, or name another folder') from error
         except OSError as error:
             raise _refusal(folder, error) from error
-        self._rows: list[Mapping[str, Any]] = []
+        self._rows: list[CellRows] = []
         self._journal: IO[str] | None = None
         self._synced_s = 0.0
         self._journal_path = folder
@@ -98,7 +99,7 @@ class ResultParts:
                  trace: TracebackType | None) -> None:
         self.close()
 
-    def add(self, *cells: Mapping[str, object]) -> None:
+    def add(self, *cells: CellRows) -> None:
         """
         Store the rows of cells, by one write to the journal.
 
@@ -148,7 +149,7 @@ class ResultParts:
         for path in part_paths(self.folder / CELLS.name):
             yield from _column(path, 'cell')
         for rows in self._rows:
-            yield rows['cell']['cell']
+            yield str(rows['cell']['cell'])
 
     def keep_wanted(self, wanted: Callable[[str, str], bool]) -> int:
         """
@@ -170,8 +171,7 @@ class ResultParts:
         for name in _part_names(earlier):
             _move(earlier, name, self.folder, is_wanted_again)
         for name in before:
-            away += _move(self.folder, name, earlier,
-                          lambda key, status: not wanted(key, status))
+            away += _move(self.folder, name, earlier, lambda key, status: not wanted(key, status))
         self._start_journal(_next_number(self.folder))
         return away
 
@@ -243,8 +243,7 @@ def _joinable(folder: Path, most_cells: int) -> list[list[str]]:
     return [names for names in groups if len(names) > 1]
 
 
-def _write_joined(folder: Path, names: Sequence[str], table: TableDeclaration,
-                  path: Path) -> None:
+def _write_joined(folder: Path, names: Sequence[str], table: TableDeclaration, path: Path) -> None:
     """Write the rows of some parts of a table, in their order."""
     rows = pa.concat_tables([_read(folder / table.name / name) for name in names])
     pq.write_table(rows.combine_chunks(), path, compression='zstd')
@@ -270,7 +269,7 @@ def newest_parts(folder: Path) -> Mapping[str, pa.Buffer]:
     return parts
 
 
-def stored_rows(folder: Path) -> Iterator[tuple[dict[str, Any], list[dict[str, Any]]]]:
+def stored_rows(folder: Path) -> Iterator[tuple[dict[str, object], list[dict[str, object]]]]:
     """
     Yield the row of each finished cell, with the rows of its vehicles.
 
@@ -285,7 +284,7 @@ def stored_rows(folder: Path) -> Iterator[tuple[dict[str, Any], list[dict[str, A
                            for table in (CELLS, VEHICLES_OF_CELLS))
         parts.append((cells, vehicles))
     for cells, vehicles in parts:
-        by_cell: dict[str, list[dict[str, Any]]] = {}
+        by_cell: dict[str, list[dict[str, object]]] = {}
         for row in vehicles.to_pylist():
             by_cell.setdefault(row['cell'], []).append(row)
         yield from ((row, by_cell.get(row['cell'], [])) for row in cells.to_pylist())
@@ -295,7 +294,7 @@ def _journal_number(path: Path) -> int:
     return int(path.stem.rpartition('-')[2])
 
 
-def _journal_lines(path: Path) -> list[dict[str, object]]:
+def _journal_lines(path: Path) -> list[CellRows]:
     """Read the rows of a journal; return none if it was removed in the meantime."""
     try:
         lines = path.read_text(encoding='utf-8').splitlines()
@@ -309,7 +308,7 @@ def _journal_lines(path: Path) -> list[dict[str, object]]:
     return rows
 
 
-def _write_rows(table: TableDeclaration, cells: Sequence[Mapping[str, object]],
+def _write_rows(table: TableDeclaration, cells: Sequence[CellRows],
                 sink: Path | pa.NativeFile) -> None:
     """Write the rows of cells in a table."""
     rows = [row for each in cells for row in _rows_of(table, each)]
@@ -319,14 +318,13 @@ def _write_rows(table: TableDeclaration, cells: Sequence[Mapping[str, object]],
                         for column in table.columns})
 
 
-def _rows_of(table: TableDeclaration, cell: Mapping[str, Any]) -> list[dict[str, object]]:
+def _rows_of(table: TableDeclaration, cell: CellRows) -> list[dict[str, object]]:
     if table is VEHICLES_OF_CELLS:
-        rows: list[dict[str, object]] = cell['vehicles']
-        return rows
+        return cell['vehicles']
     return [cell['cell'] if table is CELLS else cell['work']]
 
 
-def _write_part(folder: Path, number: int, cells: Sequence[Mapping[str, object]]) -> None:
+def _write_part(folder: Path, number: int, cells: Sequence[CellRows]) -> None:
     """Write rows as a part of every table."""
     def write(table: TableDeclaration, path: Path) -> None:
         _write_rows(table, cells, path)
@@ -371,8 +369,7 @@ def _write_filtered(source: Path, name: str, keys: set[str], inside: bool,
 
 
 def _column(path: Path, name: str) -> list[str]:
-    values: list[str] = _read(path, [name])[name].to_pylist()
-    return values
+    return _read(path, [name])[name].to_pylist()
 
 
 def _read(path: Path, columns: list[str] | None = None) -> pa.Table:

@@ -11,7 +11,7 @@ too: with several participants the clusters are crossed (Cameron, Gelbach & Mill
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.evaluation.summary.summary import Clustered, Estimate
 import numpy as np
@@ -42,9 +42,9 @@ class CellClusters(NamedTuple):
     participants: IntArray
     runs: NDArray[np.uint64]
 
-    def of(self, rows: NDArray[Any]) -> 'CellClusters':
+    def of(self, rows: IntArray | NDArray[np.bool_]) -> 'CellClusters':
         """Return those of some rows."""
-        return CellClusters(*(each[rows] for each in self))
+        return CellClusters(self.scenarios[rows], self.participants[rows], self.runs[rows])
 
     def crossed(self, clustered: Clustered) -> tuple[IntArray, IntArray]:
         """Return the clusters of the cells (N), and the clusters across these, or the same."""

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 import re
 import shlex
-from typing import Any, Literal
+from typing import Literal
 
 from crgame_ros.evaluation.summary.measures import SummaryMeasure
 
@@ -205,11 +205,10 @@ class Summary:
         for failure in found['failures']:
             failure['cells'] = [{'labels': labels, 'cells': cells}
                                 for labels, cells in failure['cells']]
-        whole: dict[str, object] = _known(found)
-        return whole
+        return {name: _known(value) for name, value in found.items()}
 
 
-def _known(value: object) -> Any:
+def _known(value: object) -> object:
     """Return a value in which those that JSON cannot represent are replaced."""
     if isinstance(value, dict):
         return {key: _known(each) for key, each in value.items()}

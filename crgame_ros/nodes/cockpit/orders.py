@@ -120,7 +120,7 @@ class CockpitOrders:
         return future.result()
 
 
-def _text(response: Any) -> str:
+def _text(response: SetBool.Response | Trigger.Response) -> str:
     if not response.success:
         raise CrgameError(response.message)
     return str(response.message)

@@ -76,8 +76,7 @@ class SceneMarkers:
         self._recorded_brake = np.zeros(len(documents.others), dtype=bool)
         self._object_ids = [item.id for item in documents.others]
         self._message = MarkerArray()
-        self.set_vehicles(np.array([item.state for item in game.vehicles]),
-                          self._stamp_ns)
+        self.set_vehicles(np.array([item.state for item in game.vehicles]), self._stamp_ns)
 
     def map_message(self, clear: bool) -> MarkerArray:
         """
@@ -154,9 +153,7 @@ class SceneMarkers:
 def _speeds(objects: ObjectStates) -> FloatArray:
     """Return signed speeds (M) [m/s]; NaN, which is never braking, where absent."""
     yaw = objects.poses[:, 2]
-    speeds: FloatArray = (objects.velocities[:, 0] * np.cos(yaw)
-                          + objects.velocities[:, 1] * np.sin(yaw))
-    return speeds
+    return objects.velocities[:, 0] * np.cos(yaw) + objects.velocities[:, 1] * np.sin(yaw)
 
 
 class AvPaths:

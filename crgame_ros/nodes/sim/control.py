@@ -24,6 +24,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.task import Future
+from std_srvs.srv import Trigger
 
 # Drivers that do not depend on the scenario.
 SCRIPTS = ('keys:', 'joy:')
@@ -361,20 +362,20 @@ class SimControl:
             if parameter.name == 'real_time_factor':
                 self.real_time_factor = float(parameter.value)
 
-    def _on_start(self, _: Any, response: object) -> object:
+    def _on_start(self, _: object, response: Trigger.Response) -> object:
         if self.over:
             return _answer(response, False, OVER)
         self.start()
         return _answer(response, True, f'waiting for the driver of {" and ".join(self.awaited)}'
                        if self.awaited else 'running')
 
-    def _on_pause(self, _: object, response: object) -> object:
+    def _on_pause(self, _: object, response: Trigger.Response) -> object:
         if self.over:
             return _answer(response, False, OVER)
         self.pause()
         return _answer(response, True, 'paused')
 
-    async def _on_step(self, _: object, response: object) -> object:
+    async def _on_step(self, _: object, response: Trigger.Response) -> object:
         if self.over:
             return _answer(response, False, OVER)
         if not self.paused:
@@ -386,17 +387,17 @@ class SimControl:
         return _answer(response, n is not None, f'at n = {n}' if n is not None else
                        'not done: the run goes on or is over')
 
-    def _on_reset(self, _: object, response: object) -> object:
+    def _on_reset(self, _: object, response: Trigger.Response) -> object:
         self.reset()
         return _answer(response, True, 'resetting')
 
-    def _on_stop(self, _: object, response: object) -> object:
+    def _on_stop(self, _: object, response: Trigger.Response) -> object:
         if self.over:
             return _answer(response, False, OVER)
         self.stop()
         return _answer(response, True, 'stopping')
 
 
-def _answer(response: Any, success: bool, text: str) -> object:
+def _answer(response: Trigger.Response, success: bool, text: str) -> object:
     response.success, response.message = success, text
     return response

@@ -3,7 +3,7 @@
 """The services of the standard simulation_interfaces that tell what is present in a run."""
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.messages.joints import MAP
@@ -12,6 +12,10 @@ from crgame_ros.nodes.sim.name_pattern import NamePattern
 from crgame_ros.ros.messages import set_time
 from crgame_ros.simulation.engine import Simulation
 from geometry_msgs.msg import Vector3
+
+if TYPE_CHECKING:
+    from simulation_interfaces import srv
+    from simulation_interfaces.msg import Bounds, EntityFilters
 
 
 class EntityServices:
@@ -35,34 +39,38 @@ class EntityServices:
         self._ok = Result(result=Result.RESULT_OK)
         self._entities: Entities
         # One message for each entity: to refill it takes a tenth of the time of a new one.
-        self._states: dict[int, Any] = {}
+        self._states: dict[int, EntityState] = {}
 
     def show(self, simulation: Simulation) -> None:
         """Answer about another run from now on."""
         self._entities = Entities(simulation)
         self._states.clear()
 
-    def on_list(self, request: Any, response: Any) -> object:
+    def on_list(self, request: 'srv.GetEntities.Request',
+                response: 'srv.GetEntities.Response') -> object:
         """Answer GetEntities."""
         places, response.result = self._select(request.filters)
         response.entities = self._names(places)
         return response
 
-    def on_states(self, request: Any, response: Any) -> object:
+    def on_states(self, request: 'srv.GetEntitiesStates.Request',
+                  response: 'srv.GetEntitiesStates.Response') -> object:
         """Answer GetEntitiesStates."""
         places, response.result = self._select(request.filters)
         response.entities = self._names(places)
         response.states = [self._state_of(place) for place in places]
         return response
 
-    def on_state(self, request: Any, response: Any) -> object:
+    def on_state(self, request: 'srv.GetEntityState.Request',
+                 response: 'srv.GetEntityState.Response') -> object:
         """Answer GetEntityState."""
         place, response.result = self._find(request.entity)
         if place is not None:
             response.state = self._state_of(place)
         return response
 
-    def on_info(self, request: Any, response: Any) -> object:
+    def on_info(self, request: 'srv.GetEntityInfo.Request',
+                response: 'srv.GetEntityInfo.Response') -> object:
         """Answer GetEntityInfo."""
         place, response.result = self._find(request.entity)
         if place is not None:
@@ -74,7 +82,8 @@ class EntityServices:
                 f'{item.reference_point}')
         return response
 
-    def on_bounds(self, request: Any, response: Any) -> object:
+    def on_bounds(self, request: 'srv.GetEntityBounds.Request',
+                  response: 'srv.GetEntityBounds.Response') -> object:
         """Answer GetEntityBounds."""
         place, response.result = self._find(request.entity)
         if place is not None:
@@ -110,7 +119,7 @@ class EntityServices:
             part.linear.x, part.linear.y, part.angular.z = x, y, rate
         return message
 
-    def _select(self, filters: Any) -> tuple[list[int], object]:
+    def _select(self, filters: 'EntityFilters') -> tuple[list[int], object]:
         """Return the places of the entities that pass the filters, and the result to tell."""
         result = self._result
         if filters.bounds.type == self._bounds.TYPE_CONVEX_HULL:
@@ -121,7 +130,7 @@ class EntityServices:
         except InputError as error:
             return [], result(result=result.RESULT_OPERATION_FAILED, error_message=str(error))
 
-    def _filtered(self, filters: Any) -> list[int]:
+    def _filtered(self, filters: 'EntityFilters') -> list[int]:
         """
         Return the places of the entities that pass the filters.
 
@@ -138,7 +147,7 @@ class EntityServices:
             {names.get(item.category, '') for item in filters.categories},
             filters.tags.tags, modes[filters.tags.filter_mode], self._region(filters.bounds))
 
-    def _region(self, volume: Any) -> Region | None:
+    def _region(self, volume: 'Bounds') -> Region | None:
         """
         Return the region that entities shall overlap; None for any.
 

@@ -5,7 +5,7 @@
 from collections.abc import Callable, MutableMapping
 from contextlib import suppress
 from functools import partial
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import SeatOccupant
@@ -21,6 +21,7 @@ from crgame_ros.ros.one_planner import OnePlanner
 from crgame_ros.ros.seats import Seats
 from crgame_ros.simulation.setup import Setup
 from rclpy.node import Node
+from std_srvs.srv import SetBool
 
 if TYPE_CHECKING:  # Recordings are read in few runs, by code that takes time to load.
     from crgame_ros.recording.recorded_game import RecordedInputs
@@ -51,8 +52,7 @@ class SimInputs:
         self._node = node
         self._clock_offset_ns = clock_offset_ns
         endpoints = Endpoints(node)
-        self.seats = Seats(
-            endpoints, setup, clock_offset_ns, seat_sources, recorded, tenants)
+        self.seats = Seats(endpoints, setup, clock_offset_ns, seat_sources, recorded, tenants)
         # Orders to planners to start or stop, until the loop reads them.
         self.planner_orders: dict[str, bool] = {}
         self._services = [
@@ -98,7 +98,8 @@ class SimInputs:
         if self._agents is not None and awaits is not None:
             self._agents.wanted = lambda stamp_ns, _frame: awaits(stamp_ns)
 
-    def _on_planner_run(self, av_id: str, request: Any, response: Any) -> object:
+    def _on_planner_run(self, av_id: str, request: SetBool.Request,
+                        response: SetBool.Response) -> object:
         self.planner_orders[av_id] = bool(request.data)
         response.success = True
         response.message = f'{av_id}: planner {"goes" if request.data else "stops"}'

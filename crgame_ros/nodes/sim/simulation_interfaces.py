@@ -9,7 +9,7 @@ of entities, named poses) is left out: the standard has it told by `GetSimulator
 
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
 
 from crgame_ros.messages.contract import load_contract
@@ -23,6 +23,10 @@ from crgame_ros.version import __version__
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 
+if TYPE_CHECKING:
+    from rclpy.action.server import ServerGoalHandle
+    from simulation_interfaces import srv
+
 FEATURES = (
     'ENTITY_TAGS', 'ENTITY_BOUNDS', 'ENTITY_BOUNDS_BOX', 'ENTITY_CATEGORIES',
     'ENTITY_STATE_GETTING', 'ENTITY_INFO_GETTING', 'SIMULATION_RESET', 'SIMULATION_RESET_STATE',
@@ -33,8 +37,7 @@ FEATURES = (
 KINDS = {'.xml': 'scenario', '.yaml': 'game', '.yml': 'game'}
 
 
-def offer_simulation_interfaces(node: Node, control: SimControl
-                                ) -> 'SimulationInterfaces | None':
+def offer_simulation_interfaces(node: Node, control: SimControl) -> 'SimulationInterfaces | None':
     """Offer the standard's services on a node; None where its package is not installed."""
     contract = load_contract()
     if not contract.actions['/simulate_steps'].available:
@@ -95,7 +98,7 @@ class SimulationInterfaces:
         self._setup = simulation.setup
         self._entities.show(simulation)
 
-    def on_features(self, _: object, response: Any) -> object:
+    def on_features(self, _: object, response: 'srv.GetSimulatorFeatures.Response') -> object:
         """Answer GetSimulatorFeatures."""
         features = self._msg.SimulatorFeatures
         response.features = features(
@@ -105,13 +108,14 @@ class SimulationInterfaces:
             'centre. See docs/nodes.md.')
         return response
 
-    def on_get_state(self, _: object, response: Any) -> object:
+    def on_get_state(self, _: object, response: 'srv.GetSimulationState.Response') -> object:
         """Answer GetSimulationState."""
         response.state = self._states(state=self._present())
         response.result = self._told('RESULT_OK')
         return response
 
-    async def on_set_state(self, request: Any, response: Any) -> object:
+    async def on_set_state(self, request: 'srv.SetSimulationState.Request',
+                           response: 'srv.SetSimulationState.Response') -> object:
         """Answer SetSimulationState, as soon as it is there."""
         states, control = self._states, self._control
         target, present = request.state.state, self._present()
@@ -141,7 +145,8 @@ class SimulationInterfaces:
             result=response.STATE_TRANSITION_ERROR, error_message=problem)
         return response
 
-    async def on_step(self, request: Any, response: Any) -> object:
+    async def on_step(self, request: 'srv.StepSimulation.Request',
+                      response: 'srv.StepSimulation.Response') -> object:
         """Answer StepSimulation, when the steps are done."""
         refusal = self._refused_step()
         if refusal is None and request.steps:
@@ -150,7 +155,7 @@ class SimulationInterfaces:
         response.result = refusal or self._told('RESULT_OK')
         return response
 
-    async def on_simulate_steps(self, goal: Any) -> object:
+    async def on_simulate_steps(self, goal: 'ServerGoalHandle') -> object:
         """Return the result of a goal of SimulateSteps, when the steps are done."""
         refusal, steps, n = self._refused_step(), goal.request.steps, None
         if refusal is None and steps:
@@ -168,14 +173,15 @@ class SimulationInterfaces:
             goal.abort()
         return self._simulate_steps.Result(result=refusal or self._told('RESULT_OK'))
 
-    def on_cancel(self, goal: Any) -> bool:
+    def on_cancel(self, goal: 'ServerGoalHandle') -> bool:
         """Withdraw the order of a goal; return whether there was one."""
         order = self._goals.get(bytes(goal.goal_id.uuid))
         if order is not None:
             self._control.withdraw(order)
         return order is not None
 
-    async def on_reset(self, request: Any, response: Any) -> object:
+    async def on_reset(self, request: 'srv.ResetSimulation.Request',
+                       response: 'srv.ResetSimulation.Response') -> object:
         """Answer ResetSimulation, when it is done."""
         if request.scope not in (request.SCOPE_DEFAULT, request.SCOPE_STATE, request.SCOPE_ALL):
             response.result = self._told(
@@ -185,12 +191,13 @@ class SimulationInterfaces:
         response.result = self._after_reset(await self._control.reset())
         return response
 
-    def on_get_world(self, _: object, response: Any) -> object:
+    def on_get_world(self, _: object, response: 'srv.GetCurrentWorld.Response') -> object:
         """Answer GetCurrentWorld."""
         response.result, response.world = self._told('RESULT_OK'), self._world()
         return response
 
-    async def on_load_world(self, request: Any, response: Any) -> object:
+    async def on_load_world(self, request: 'srv.LoadWorld.Request',
+                            response: 'srv.LoadWorld.Response') -> object:
         """Answer LoadWorld, when the world is there and stands at its first step."""
         # In version 2 the two are in a message of their own.
         resource = getattr(request, 'world_resource', request)
@@ -263,7 +270,7 @@ class SimulationInterfaces:
         return self._told('RESULT_OK') if problem is None else self._told(
             'RESULT_OPERATION_FAILED', problem)
 
-    def _tell(self, goal: Any, count: int) -> None:
+    def _tell(self, goal: 'ServerGoalHandle', count: int) -> None:
         """Tell how many steps of a goal are done; a failure costs only this."""
         attempt(self._node, lambda: goal.publish_feedback(self._simulate_steps.Feedback(
             completed_steps=count, remaining_steps=goal.request.steps - count)))

@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measuring the loop: the causes of each late step."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import gc
 from itertools import pairwise
 import signal
 import time
 from types import FrameType
-from typing import Any
 
 from crgame_ros.timing.late_step import (
     Causes,
@@ -52,7 +51,7 @@ class StepWatch:
         self._continued = False
         self._stolen = self._counters.stolen()
         # The previous handler of the signal.
-        self._before: Any = None
+        self._before: Callable[[int, FrameType | None], object] | int | None = None
 
     def __enter__(self) -> 'StepWatch':
         """Start observing garbage collections and the signal that ends a stop."""
@@ -92,8 +91,7 @@ class StepWatch:
         if phase is Phase.SERVICES:
             self._stolen = self._counters.stolen()
 
-    def explain(self, due_ns: int, late_s: float, factor: float
-                ) -> tuple[Causes, Phase | None]:
+    def explain(self, due_ns: int, late_s: float, factor: float) -> tuple[Causes, Phase | None]:
         """
         Return why the cycle whose first phase was marked last is late, and discard the one before.
 
@@ -157,8 +155,7 @@ class StepWatch:
             end, last = time.thread_time_ns(), len(counts) - 1
         first = counts[0]
         waited_ns = (counts[last].waited_ns or 0) - (first.waited_ns or 0)
-        return max(0, counts[last].wall_ns - first.wall_ns - waited_ns
-                   - (end - first.computed_ns))
+        return max(0, counts[last].wall_ns - first.wall_ns - waited_ns - (end - first.computed_ns))
 
     def _on_collection(self, phase: str, _info: dict[str, int]) -> None:
         now_ns = time.monotonic_ns()

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 import math
-from typing import Any
 import warnings
 
 from crgame_ros.paths import extra_install
@@ -14,6 +13,9 @@ from crgame_ros.study.file import StudyFile
 from crgame_ros.study.planned_analysis import Comparison
 from crgame_ros.study.trial_settings import Factor
 import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ def missing_extra() -> str:
     return extra_install('statistics') if find_spec('statsmodels') is None else ''
 
 
-def fit_models(study: StudyFile, rows: Sequence[Mapping[str, Any]],
+def fit_models(study: StudyFile, rows: Sequence[Mapping[str, object]],
                columns: Mapping[str, str]) -> Iterator[MixedModel]:
     """
     Fit the model of each planned comparison; needs statsmodels.
@@ -124,7 +126,7 @@ def fit_models(study: StudyFile, rows: Sequence[Mapping[str, Any]],
         yield fit_model(formula, rows, columns)
 
 
-def fit_model(formula: ModelFormula, rows: Sequence[Mapping[str, Any]],
+def fit_model(formula: ModelFormula, rows: Sequence[Mapping[str, object]],
               columns: Mapping[str, str]) -> MixedModel:
     """
     Fit a model by restricted maximum likelihood; needs statsmodels.
@@ -133,21 +135,22 @@ def fit_model(formula: ModelFormula, rows: Sequence[Mapping[str, Any]],
     :param columns: of the factors, by their names.
     """
     used = [row for row in rows if row['block'] in formula.blocks
-            and (value := row.get(formula.measure)) is not None and math.isfinite(value)]
-    people = sorted({row['participant'] for row in used})
+            and isinstance(value := row.get(formula.measure), int | float)
+            and math.isfinite(value)]
+    people = sorted({str(row['participant']) for row in used})
     names, design = _design(formula, used, columns)
     model = MixedModel(formula, len(used), len(people))
     if len(people) < 2 or len(used) <= len(people) + len(names) \
             or np.linalg.matrix_rank(design) < len(names):
         return MixedModel(formula, len(used), len(people),
                           problem='there are too few trials for it')
-    values = np.array([float(row[formula.measure]) for row in used])
-    return _fitted(model, values, design, np.array([people.index(row['participant'])
+    values = np.array([row[formula.measure] for row in used], dtype=np.float64)
+    return _fitted(model, values, design, np.array([people.index(str(row['participant']))
                                                     for row in used]), names)
 
 
-def _fitted(model: MixedModel, values: Any, design: Any, groups: Any,
-            names: Sequence[str]) -> MixedModel:
+def _fitted(model: MixedModel, values: FloatArray, design: FloatArray,
+            groups: NDArray[np.int64], names: Sequence[str]) -> MixedModel:
     from statsmodels.regression.mixed_linear_model import MixedLM
     formula = model.formula
     # statsmodels tells a variance of zero by an absolute bound: it gets standardised values.
@@ -179,8 +182,8 @@ def _fitted(model: MixedModel, values: Any, design: Any, groups: Any,
                       scale * math.sqrt(float(fit.scale)), '; '.join(told))
 
 
-def _design(formula: ModelFormula, rows: Sequence[Mapping[str, Any]],
-            columns: Mapping[str, str]) -> tuple[list[str], Any]:
+def _design(formula: ModelFormula, rows: Sequence[Mapping[str, object]],
+            columns: Mapping[str, str]) -> tuple[list[str], FloatArray]:
     """Return names and values of the fixed effects: an intercept, and levels but the first."""
     names, parts = ['(Intercept)'], [np.ones(len(rows))]
     for factor in formula.factors:

@@ -5,7 +5,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import math
-from typing import Any
 
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.planned_analysis import Alternative, Comparison
@@ -208,7 +207,8 @@ class PlannedTest:
     p_holm: float
 
 
-def used_rows(study: StudyFile, rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+def used_rows(study: StudyFile,
+              rows: Iterable[Mapping[str, object]]) -> list[Mapping[str, object]]:
     """Return the trials that the planned analysis uses: none of staircases."""
     stepped = {block.name for block in study.blocks if block.staircase is not None}
     flags = () if study.analysis.flagged == 'use' else FLAGS
@@ -216,7 +216,7 @@ def used_rows(study: StudyFile, rows: Iterable[Mapping[str, Any]]) -> list[Mappi
             and not any(row.get(flag) for flag in flags)]
 
 
-def level_means(rows: Iterable[Mapping[str, Any]], column: str,
+def level_means(rows: Iterable[Mapping[str, object]], column: str,
                 measure: str) -> dict[str, dict[str, float]]:
     """
     Compute each participant's mean of a measure in each level, over all trials of the level.
@@ -227,14 +227,14 @@ def level_means(rows: Iterable[Mapping[str, Any]], column: str,
     sums: dict[str, dict[str, list[float]]] = {}
     for row in rows:
         value, level = row.get(measure), row.get(column)
-        if value is None or level is None or not math.isfinite(value):
+        if level is None or not isinstance(value, int | float) or not math.isfinite(value):
             continue
-        sums.setdefault(level, {}).setdefault(row['participant'], []).append(float(value))
+        sums.setdefault(str(level), {}).setdefault(str(row['participant']), []).append(value)
     return {level: {person: sum(values) / len(values) for person, values in people.items()}
             for level, people in sums.items()}
 
 
-def planned_tests(study: StudyFile, rows: Sequence[Mapping[str, Any]],
+def planned_tests(study: StudyFile, rows: Sequence[Mapping[str, object]],
                   columns: Mapping[str, str]) -> list[PlannedTest]:
     """
     Run all planned comparisons.

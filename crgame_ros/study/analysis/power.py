@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 import math
-from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.analysis.planned_tests import planned_tests
@@ -266,7 +265,7 @@ class SimulatedTrials:
         self.measures = tuple(models)
         planned = [(number, _grouped(study, person, trial)) for number, person in enumerate(people)
                    for trial in _compared_trials(study, person.place, person.group)]
-        self.rows: list[dict[str, Any]] = [
+        self.rows: list[dict[str, object]] = [
             {'participant': people[number].id, 'trial': trial.number, 'block': trial.block,
              **levels} for number, (trial, levels) in planned]
         self._people = np.array([number for number, _ in planned], dtype=np.intp)
@@ -275,7 +274,7 @@ class SimulatedTrials:
             sum(model.effects.get(level, 0.0) for level in levels.items())
             for _, (_, levels) in planned]) for measure, model in models.items()}
 
-    def draw(self, rng: np.random.Generator) -> list[dict[str, Any]]:
+    def draw(self, rng: np.random.Generator) -> list[dict[str, object]]:
         """Draw all measures of all trials; return the rows, which the next draw overwrites."""
         for measure, model in self._models.items():
             intercepts = rng.normal(0.0, model.participant_sd, self._count)

@@ -275,7 +275,7 @@ class LiveDrives:
             else:
                 if hold:
                     rider.session.hold(True)
-                rider.session.finish(**own)
+                rider.session.finish(None, **own)
 
     async def _break_off(self, item: SessionItem, reason: str | None) -> None:
         """End a run that does not count: it was aborted, or its item was skipped."""
@@ -284,8 +284,7 @@ class LiveDrives:
         self._set_phase(DrivePhase.PREPARING, item.id, work=DriveWork.STOPPED)
         if director.status.run != 'ended':
             await director.stop()
-        await self._until(lambda: director.status.run == 'ended', CLOSES_S,
-                          'the run does not end')
+        await self._until(lambda: director.status.run == 'ended', CLOSES_S, 'the run does not end')
 
     async def _lose(self) -> None:
         """Record the loss of the graph; another one is started for the same drive."""

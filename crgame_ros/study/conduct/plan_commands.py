@@ -6,14 +6,18 @@ import argparse
 from functools import partial
 from pathlib import Path
 import sys
-from typing import Any
+from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
+
+if TYPE_CHECKING:  # Slow imports that other commands do not need.
+    from crgame_ros.study.analysis.power import Power
+    from crgame_ros.study.file import StudyFile
 
 _MOST = 10_000
 
 
-def add_plan_arguments(what: Any) -> None:
+def add_plan_arguments(what: 'argparse._SubParsersAction[argparse.ArgumentParser]') -> None:
     """
     Add the commands.
 
@@ -74,7 +78,7 @@ def numbers_of(text: str) -> range:
     return range(first, last + 1, step)
 
 
-def _power(values: argparse.Namespace, study: Any) -> Any:
+def _power(values: argparse.Namespace, study: 'StudyFile') -> 'list[list[Power]]':
     from crgame_ros.recording.progress import Progress
     from crgame_ros.study.analysis.power import power_of
     counts = numbers_of(values.participants)
@@ -101,7 +105,7 @@ def power_command(values: argparse.Namespace) -> int:
     return 0
 
 
-def check_planned_measures(study: Any) -> None:
+def check_planned_measures(study: 'StudyFile') -> None:
     """
     Check that the planned measures are columns of the table of trials.
 

@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 import secrets
 import time
-from typing import Any, Protocol
+from typing import Protocol
 from urllib.parse import urlencode
 
 from crgame_ros.cockpit.run_status import RunStatus
@@ -42,7 +42,7 @@ def cut_short(reason: str) -> str:
     return _CUT_SHORT.get(reason, f'the run ended: {reason or "the reason is unknown"}')
 
 
-def outcome_of(status: RunStatus, seat: str, end_time_s: float) -> dict[str, Any]:
+def outcome_of(status: RunStatus, seat: str, end_time_s: float) -> dict[str, object]:
     """
     Return the outcome of a drive.
 
@@ -283,6 +283,6 @@ class Rider:
                    and str(entry.get('reason')).startswith(why)
                    for entry in self.session.journal.entries)
 
-    def quality(self) -> dict[str, Any]:
+    def quality(self) -> dict[str, object]:
         """Return what the journal keeps about the data of the present drive."""
         return {'quality': self.drive_watch.values(), 'doubts': list(map(str, self.doubts))}

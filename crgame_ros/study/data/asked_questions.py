@@ -5,7 +5,6 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 import json
-from typing import Any
 
 from crgame_ros.analysis.tables.column import Column
 from crgame_ros.study.data.study_row_table import (
@@ -15,6 +14,7 @@ from crgame_ros.study.data.study_row_table import (
     unlike,
 )
 from crgame_ros.study.file import Questions, StudyFile
+from crgame_ros.study.question import Answer
 from crgame_ros.study.questionnaire import load_questionnaire, Questionnaire, questionnaire_name
 from crgame_ros.study.session_script import session_of, SessionItem
 
@@ -37,7 +37,7 @@ class AskedScale:
                   for question in self.scale.questions),
                 *score_columns(self.scale, self.prefix)]
 
-    def values(self, answers: Mapping[str, Any]) -> dict[str, object]:
+    def values(self, answers: Mapping[str, Answer]) -> dict[str, object]:
         """Return the values of its columns."""
         return {**{f'{self.prefix}{question.name}': plain_answer(answers.get(question.name))
                    for question in self.scale.questions},
@@ -95,8 +95,7 @@ def _questions(study: StudyFile) -> Iterator[tuple[SessionItem, Questions, int]]
     """Yield the items with questionnaires, and how often each was asked before at that point."""
     seen: dict[tuple[str, str], int] = {}
     # A step may be only for some groups; equal ids are the same step.
-    items = {item.id: item for group in study.group_names
-             for item in session_of(study, 0, group)}
+    items = {item.id: item for group in study.group_names for item in session_of(study, 0, group)}
     for item in items.values():
         if isinstance(item.what, Questions):
             place = _place(item.id), item.what.name

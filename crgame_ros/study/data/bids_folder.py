@@ -248,7 +248,7 @@ def escaped(value: object) -> str:
 
 
 def _events(record: ParticipantRecord,
-            rows: Sequence[Mapping[str, Any]]) -> Iterator[list[Any]]:
+            rows: Sequence[Mapping[str, Any]]) -> Iterator[list[object]]:
     """Yield the rows: a driven trial with its duration, all else without duration."""
     ends = {(each.item, each.attempt): each for each in record.attempts}
     for row in rows:
@@ -261,8 +261,7 @@ def _events(record: ParticipantRecord,
             continue
         if kind == 'trial_started' and attempt is not None:
             kind = 'trial'
-            duration = None if attempt.ended_at is None \
-                else attempt.ended_at - attempt.started_at
+            duration = None if attempt.ended_at is None else attempt.ended_at - attempt.started_at
             name = attempt.says('outcome') or attempt.ending
             value = attempt.says('reason')
         yield [onset, duration, kind, None if attempt is None else
@@ -271,15 +270,15 @@ def _events(record: ParticipantRecord,
 
 
 def _instrument_row(record: ParticipantRecord, trial: CountedTrial,
-                    event: InstrumentEvent) -> list[Any]:
+                    event: InstrumentEvent) -> list[object]:
     attempt = trial.attempt
     return [event.wall_s - record.begun_at, 0.0, KIND, attempt.trial.condition.name,
             attempt.trial.number, attempt.attempt, attempt.item, event.stream, event.value,
             event.run_time_s]
 
 
-def _sidecar() -> dict[str, object]:
-    found: dict[str, Any] = {
+def _sidecar() -> dict[str, dict[str, str]]:
+    found: dict[str, dict[str, str]] = {
         name: {'Description': what} | ({'Units': unit} if unit else {})
         for name, (unit, what) in _EVENT_COLUMNS.items()}
     found['value']['Description'] += f'. {ESCAPED}'
@@ -288,7 +287,7 @@ def _sidecar() -> dict[str, object]:
     return found
 
 
-def _described(column: Column) -> dict[str, Any]:
+def _described(column: Column) -> Mapping[str, object]:
     notes = {'Description': column.definition}
     if column.variant:
         notes['Description'] += f'; {column.variant}'

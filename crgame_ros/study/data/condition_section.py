@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from operator import itemgetter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.analysis.report.section import (
     axis_ticks,
@@ -122,8 +122,8 @@ def within_halves(table: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(_t(people - 1) * np.sqrt(variances / people))
 
 
-def participant_means(rows: Iterable[Mapping[str, Any]], column: str,
-                      name_of: Callable[[Mapping[str, Any]], str] = itemgetter('condition')
+def participant_means(rows: Iterable[Mapping[str, object]], column: str,
+                      name_of: Callable[[Mapping[str, object]], str] = itemgetter('condition')
                       ) -> dict[tuple[str, str], float]:
     """
     Compute the mean of a column for each participant in each condition, over repetitions.
@@ -134,15 +134,14 @@ def participant_means(rows: Iterable[Mapping[str, Any]], column: str,
     found: dict[tuple[str, str], list[float]] = {}
     for row in rows:
         value = row.get(column)
-        if value is not None and math.isfinite(value):
-            found.setdefault((row['participant'], name_of(row)), []).append(float(value))
+        if isinstance(value, int | float) and math.isfinite(value):
+            found.setdefault((str(row['participant']), name_of(row)), []).append(value)
     return {key: sum(values) / len(values) for key, values in found.items()}
 
 
 def _half(values: NDArray[np.float64]) -> float:
     count = len(values)
-    return math.nan if count < 2 else float(
-        _t(count - 1) * values.std(ddof=1) / math.sqrt(count))
+    return math.nan if count < 2 else float(_t(count - 1) * values.std(ddof=1) / math.sqrt(count))
 
 
 def _mean(values: NDArray[np.float64]) -> float:
@@ -257,7 +256,7 @@ class ShownMeasure(NamedTuple):
 
 
 def shown_measures(data: StudyData, conditions: Sequence[str], blocks: Sequence[str],
-                   name_of: Callable[[Mapping[str, Any]], str] = itemgetter('condition')
+                   name_of: Callable[[Mapping[str, object]], str] = itemgetter('condition')
                    ) -> list[ShownMeasure]:
     """
     Return the scores and measures with values in these blocks, with their means.
@@ -294,8 +293,7 @@ def condition_section(data: StudyData) -> str:
     html = note('Of each participant and condition the mean over its trials is taken, then the '
                 'mean over participants. Points are participants, squares are means with their '
                 '95 % intervals.')
-    return html + ''.join(_block(data, names, blocks[names], len(blocks) > 1)
-                          for names in blocks)
+    return html + ''.join(_block(data, names, blocks[names], len(blocks) > 1) for names in blocks)
 
 
 def interval_note(means: Sequence[ConditionMeans]) -> str:

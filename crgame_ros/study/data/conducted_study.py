@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 import json
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from crgame_ros.errors import InputError
 from crgame_ros.recording.run_folder import PARTICIPANTS, STUDY_FILE
@@ -17,7 +17,7 @@ from crgame_ros.study.followed_session import failed_checks, followed, last_answ
 from crgame_ros.study.groups import Allocation, allocation_of
 from crgame_ros.study.question import Answer
 from crgame_ros.study.questionnaire import questions_of
-from crgame_ros.study.session_journal import DECLINED, read_journal, SessionEvent
+from crgame_ros.study.session_journal import DECLINED, JournalEntry, read_journal, SessionEvent
 from crgame_ros.study.session_script import items_before_groups, session_of, SessionItem
 from crgame_ros.study.staircase import Track
 from crgame_ros.study.trial_plan import PlannedTrial
@@ -49,9 +49,9 @@ class TrialAttempt:
     started_at: float
     ended_at: float | None = None
     ending: Ending = 'open'
-    told: Mapping[str, object] | None = None
+    told: JournalEntry | None = None
 
-    def says(self, key: str) -> Any:
+    def says(self, key: str) -> object:
         """Return a value of its last entry by key; None without one."""
         return None if self.told is None else self.told.get(key)
 
@@ -70,10 +70,10 @@ class AnsweredItem:
     """
 
     item: SessionItem
-    answers: Mapping[str, Any]
+    answers: Mapping[str, Answer]
     at: float
     attempt: int | None
-    told: Mapping[str, Any]
+    told: JournalEntry
     after: TrialAttempt | None
 
 
@@ -98,7 +98,7 @@ class ParticipantRecord:
     folder: Path
     study: StudyFile
     items: Mapping[str, SessionItem]
-    entries: tuple[Mapping[str, Any], ...]
+    entries: tuple[JournalEntry, ...]
     allocation: Allocation | None = None
     members: tuple[str, ...] = ()
     tracks: Mapping[tuple[str, str], Track] = field(default_factory=dict)
@@ -164,7 +164,7 @@ class ParticipantRecord:
                                               entry['at'], attempt, entry, after)
         return tuple(found[name] for name in self.items if name in found)
 
-    def _valid(self, item: SessionItem, answers: Mapping[str, Any]) -> dict[str, Answer]:
+    def _valid(self, item: SessionItem, answers: Mapping[str, Answer]) -> dict[str, Answer]:
         """Return answers by question; one that a question does not take is missing."""
         return {question.name: None if question.kind.refusal(answer) else answer
                 for question in questions_of(self.study, item) if question.name in answers
@@ -213,7 +213,7 @@ class ParticipantRecord:
         return self.study.groups is not None and self.allocation is None
 
     @property
-    def exclusion(self) -> Mapping[str, Any] | None:
+    def exclusion(self) -> JournalEntry | None:
         """Return the entry by which a rule has excluded the participant; None without one."""
         return next((entry for entry in self.entries
                      if entry['entry'] == SessionEvent.EXCLUDED), None)
@@ -251,7 +251,7 @@ class ParticipantRecord:
         return next((entry['language'] for entry in reversed(self.entries)
                      if entry.get('language')), None)
 
-    def _attempt_of(self, entry: Mapping[str, Any], item: str) -> int:
+    def _attempt_of(self, entry: JournalEntry, item: str) -> int:
         told = entry.get('attempt')
         before = [each for each in self.attempts if each.item == item and
                   each.started_at <= entry['at']]
@@ -278,7 +278,7 @@ class ParticipantRecord:
         if openly is not None:
             yield openly
 
-    def _run(self, entry: Mapping[str, Any]) -> Path | None:
+    def _run(self, entry: JournalEntry) -> Path | None:
         """Return the folder of a recording, if it is one of those who drove together."""
         name = entry.get('run')
         if not name or '..' in Path(name).parts or Path(name).is_absolute():
@@ -286,7 +286,7 @@ class ParticipantRecord:
         return self.recordings / name
 
 
-def _ended(attempt: TrialAttempt, ending: Ending, entry: Mapping[str, Any] | None,
+def _ended(attempt: TrialAttempt, ending: Ending, entry: JournalEntry | None,
            folder: Path | None) -> TrialAttempt:
     return TrialAttempt(attempt.item, attempt.trial, attempt.attempt, folder or attempt.folder,
                         attempt.started_at, None if entry is None else float(entry['at']), ending,
@@ -326,7 +326,7 @@ def read_participant(study: StudyFile, folder: Path) -> ParticipantRecord | None
                              tuple(begun.get('members') or ()), session.tracks)
 
 
-def _member(begun: Mapping[str, Any]) -> int:
+def _member(begun: JournalEntry) -> int:
     """Return the number of the participant among those who drove together."""
     members = begun.get('members') or [begun['participant']]
     return int(members.index(begun['participant']))

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import count
 import json
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.software import software_with_commit
@@ -79,14 +78,14 @@ def make_study(study: StudyFile, file: Path, pictures: Sequence[str], out: Path,
 
 
 def _finish_all(session: ParticipantSession, rng: np.random.Generator,
-                draw: Callable[[SimulatedPerson], Sequence[Mapping[str, Any]]]) -> None:
+                draw: Callable[[SimulatedPerson], Sequence[Mapping[str, object]]]) -> None:
     """
     Go through a session.
 
     :param draw: returns the trials of a person, whose group is known then.
     """
     measures = dict.fromkeys(each.measure for each in session.study.analysis.comparisons)
-    values: dict[int, dict[str, float]] = {}
+    values: dict[object, dict[str, object]] = {}
     while (item := session.next_item) is not None:
         what = item.what
         if isinstance(what, PracticeDrives):

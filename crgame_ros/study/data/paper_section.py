@@ -31,7 +31,7 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
 
     :raises InputError: if a file of the study cannot be read.
     """
-    study, folder = data.folder.study, data.folder
+    study, folder, rows = data.folder.study, data.folder, [trial.row for trial in data.trials]
     files = sorted(path for path in folder.study_path.parent.rglob('*') if path.is_file())
     return {
         'study': study.name, 'title': study.title.in_language(study.language),
@@ -50,18 +50,18 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
                        for condition in conditions_of(study, block, group)},
         'staircases': {block.name: block.staircase.told for block in study.blocks
                        if block.staircase is not None},
-        'random_seeds': sorted({row['random_seed'] for row in _rows(data)
+        'random_seeds': sorted({row['random_seed'] for row in rows
                                 if row.get('random_seed') is not None}),
         'questionnaires': [{
             'name': scale.name, 'title': scale.title.in_language(study.language),
             'citation': scale.citation, 'scores': [_plain(write(score)) for score in scale.scores]}
             for scale in data.asked.scales()],
-        'delays_s': {name: spread([row.get(name) for row in _rows(data)])
+        'delays_s': {name: spread([row.get(name) for row in rows])
                      for name in ('input_delay_s', 'link_delay_s')},
         'quality_bounds': study.quality.as_dict(),
         'view': {'geometry': 'docs/driver_view.md',
-                 'shown': sorted({row['view'] for row in _rows(data) if row.get('view')}),
-                 **{name: spread([row.get(name) for row in _rows(data)]) for name in _VIEW_NAMES}},
+                 'shown': sorted({row['view'] for row in rows if row.get('view')}),
+                 **{name: spread([row.get(name) for row in rows]) for name in _VIEW_NAMES}},
         'reference_points': {
             'positions and motion of vehicles': 'rear axle',
             'gaps, distances, times to collision': 'footprints, bumper to bumper',
@@ -75,15 +75,11 @@ def spread(values: list[float | None]) -> dict[str, float] | None:
             'of': len(known)} if known else None
 
 
-def _rows(data: StudyData) -> list[Mapping[str, Any]]:
-    return [trial.row for trial in data.trials]
-
-
 def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _plain(value: Any) -> object:
+def _plain(value: object) -> object:
     """Return values in JSON form."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}

@@ -149,7 +149,7 @@ def _run_rows(attempt: TrialAttempt, run: RunTables,
 
 def drive_start_s(attempt: TrialAttempt) -> float:
     """Return the wall clock time at which the run's clock began [s since 1970]."""
-    told = attempt.says('start_at')
+    told = None if attempt.told is None else attempt.told.get('start_at')
     return float(told) if told else attempt.started_at
 
 

@@ -6,16 +6,17 @@ import argparse
 from datetime import datetime, UTC
 from pathlib import Path
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 
 if TYPE_CHECKING:  # Slow imports that other commands do not need.
+    from crgame_ros.study.data.conducted_study import ConductedStudy
     from crgame_ros.study.data.study_data import StudyData
     from crgame_ros.study.file import StudyFile
 
 
-def add_data_arguments(what: Any) -> None:
+def add_data_arguments(what: 'argparse._SubParsersAction[argparse.ArgumentParser]') -> None:
     """
     Add the commands.
 
@@ -145,7 +146,7 @@ def told_overdue(study: 'StudyFile', folder: Path) -> list[str]:
             for name, day in StudyFolder(folder).overdue(study, datetime.now(UTC).date())]
 
 
-def _read(folder: Any, reports: bool = False) -> 'StudyData':
+def _read(folder: 'ConductedStudy', reports: bool = False) -> 'StudyData':
     from crgame_ros.recording.progress import Progress
     from crgame_ros.study.data.study_data import read_study_data
     from crgame_ros.study.folder import StudyFolder

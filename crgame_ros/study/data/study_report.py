@@ -180,8 +180,7 @@ def _measured(value: float | None, factor: float, digits: int) -> str:
 
 
 def _rows(data: StudyData, name: str) -> list[dict[str, Any]]:
-    rows: list[dict[str, object]] = data.tables[name].to_pylist()
-    return rows
+    return data.tables[name].to_pylist()
 
 
 def participant_flow(data: StudyData) -> list[tuple[str, dict[str, int]]]:
@@ -196,8 +195,7 @@ def participant_flow(data: StudyData) -> list[tuple[str, dict[str, int]]]:
     def count(words: str, group: str) -> None:
         flow.setdefault(words, Counter())[group] += 1
 
-    rules = [record.exclusion['reason'] for record in data.records
-             if record.exclusion is not None]
+    rules = [record.exclusion['reason'] for record in data.records if record.exclusion is not None]
     # The order of the table.
     for words in ('began', 'excluded', *(f'excluded: {rule}' for rule in dict.fromkeys(rules)),
                   'did not give consent', 'session ended early', 'withdrew, data deleted',

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 import json
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDeclaration, TEXT
 from crgame_ros.analysis.tables.data_package import data_package, WrittenTable
@@ -90,7 +89,7 @@ def rerun_study(data: StudyData, planners: Sequence[str], out: Path, workers: in
     for trial in trials:
         groups.setdefault((int(trial.row['random_seed']), _is_ridden(trial)), []).append(trial)
     seeds, kinds = ({key[part] for key in groups} for part in (0, 1))
-    rows: list[dict[str, Any]] = []
+    rows: list[dict[str, object]] = []
     for (seed, ridden), of_group in sorted(groups.items(), key=lambda item: item[0]):
         folder = out if len(seeds) == 1 else out / f'seed-{seed}'
         if ridden and len(kinds) > 1:
@@ -99,7 +98,8 @@ def rerun_study(data: StudyData, planners: Sequence[str], out: Path, workers: in
         rows += _compared(of_group, labels, folder)
     rows.sort(key=lambda row: (row['participant'], row['trial'], row['planner'], row['vehicle']))
     _write(rows, out, data.folder.study.name)
-    return [_summarize(rows, planner) for planner in dict.fromkeys(row['planner'] for row in rows)]
+    return [_summarize(rows, planner)
+            for planner in dict.fromkeys(str(row['planner']) for row in rows)]
 
 
 def _can_be_repeated(trial: CountedTrial, say: Callable[[str], object]) -> bool:
@@ -146,7 +146,7 @@ def _evaluated(trials: Sequence[CountedTrial], planners: Sequence[str], seed: in
     from crgame_ros.evaluation.progress import EvaluationProgress
     humans = [str(trial.attempt.folder.resolve()) for trial in trials
               if trial.attempt.folder is not None]
-    given: dict[str, Any] = {'humans': humans, 'planners': list(planners), 'seeds': [seed]}
+    given: dict[str, object] = {'humans': humans, 'planners': list(planners), 'seeds': [seed]}
     if ridden:
         given |= {'take_overs': 'end', 'planners': list(dict.fromkeys((OWN, *planners)))}
     plan = parse_plan(given, '--planner', Path.cwd())
@@ -157,13 +157,13 @@ def _evaluated(trials: Sequence[CountedTrial], planners: Sequence[str], seed: in
 
 
 def _compared(trials: Sequence[CountedTrial], labels: Sequence[str],
-              folder: Path) -> Iterator[dict[str, Any]]:
+              folder: Path) -> Iterator[dict[str, object]]:
     """Yield rows that compare the recorded and the new results."""
     cells = _parts(folder, 'cells')
-    vehicles: dict[str, list[dict[str, object]]] = {}
+    vehicles: dict[object, list[dict[str, object]]] = {}
     for row in _parts(folder, 'vehicles'):
         vehicles.setdefault(row['cell'], []).append(row)
-    by_label = dict(zip(labels, trials, strict=True))
+    by_label: dict[object, CountedTrial] = dict(zip(labels, trials, strict=True))
     for cell in cells:
         trial = by_label.get(cell['human'])
         if trial is None or trial.run is None:
@@ -189,7 +189,7 @@ def _row(trial: CountedTrial, cell: Mapping[str, object], recorded: Mapping[str,
             'rerun_duration_s': cell['simulated_s']}
 
 
-def _parts(folder: Path, name: str) -> list[dict[str, Any]]:
+def _parts(folder: Path, name: str) -> list[dict[str, object]]:
     rows: list[dict[str, object]] = []
     for part in sorted((folder / name).glob('part-*.parquet')):
         rows += pq.read_table(part).to_pylist()

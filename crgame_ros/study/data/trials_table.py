@@ -44,7 +44,7 @@ TASK_COLUMNS = (
 
 
 def task_values(scores: Sequence[Mapping[str, object]],
-                requests: Sequence[Mapping[str, Any]]) -> dict[str, object]:
+                requests: Sequence[Mapping[str, object]]) -> dict[str, object]:
     """
     Return the values of the columns.
 
@@ -54,7 +54,7 @@ def task_values(scores: Sequence[Mapping[str, object]],
     found: dict[str, object] = {'take_over_requests': len(requests)}
     if len(scores) == 1:
         found |= {f'detection_{name}': scores[0][name] for name in _SCORED}
-    inputs = [row['first_input_s'] for row in requests if row['first_input_s'] is not None]
+    inputs = [at_s for row in requests if isinstance(at_s := row['first_input_s'], int | float)]
     found['take_over_requests_taken'] = len(inputs)
     if inputs:
         found['take_over_first_input_mean_s'] = sum(inputs) / len(inputs)

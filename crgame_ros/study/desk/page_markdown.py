@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from datetime import datetime, UTC
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TypeAlias, TypedDict
 from urllib.parse import unquote, urlsplit
 
 from crgame_ros.cockpit.page_files import PageFile
@@ -26,7 +26,9 @@ PICTURES = {'.png': 'image/png', '.jpg': 'image/jpeg', '.jpeg': 'image/jpeg',
 # The elements of a page; the page's script creates only these.
 TAGS = {'heading', 'paragraph', 'bullet_list', 'ordered_list', 'list_item', 'blockquote', 'hr',
         'em', 'strong', 's', 'table', 'thead', 'tbody', 'tr', 'th', 'td'}
-Node = str | dict[str, Any]
+Element = TypedDict('Element', {  # noqa: UP013
+    'tag': str, 'children': list['Node'], 'href': str, 'src': str, 'alt': str}, total=False)
+Node: TypeAlias = str | Element
 _EMPTY = ('br', 'hr')
 _STYLE = ('body { max-width: 44rem; margin: 2rem auto; padding: 0 1rem; }'
           ' body { font: 1rem/1.5 sans-serif; }'

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict
 import math
-from typing import Any
 
 from crgame_ros.study.answer_condition import AnswerCondition, holds_for
 from crgame_ros.study.desk.desk import Desk, UNDER_WAY
@@ -25,7 +24,7 @@ from crgame_ros.study.question import (
     VasQuestion,
 )
 from crgame_ros.study.questionnaire import load_questionnaire, questionnaire_name
-from crgame_ros.study.session_journal import DECLINED, SessionEvent
+from crgame_ros.study.session_journal import DECLINED, JournalEntry, SessionEvent
 from crgame_ros.study.session_script import Fields, is_driven, PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 
@@ -73,7 +72,7 @@ def how_over(desk: Desk) -> str:
     return 'declined' if ended['reason'] == DECLINED else 'ended'
 
 
-def _end_of(desk: Desk) -> Mapping[str, Any] | None:
+def _end_of(desk: Desk) -> JournalEntry | None:
     return next((entry for entry in desk.session.journal.entries
                  if entry['entry'] in (SessionEvent.ENDED, SessionEvent.EXCLUDED)), None)
 
@@ -99,7 +98,7 @@ def _repeats(desk: Desk, item: SessionItem) -> int:
                for entry in desk.session.journal.entries)
 
 
-def _item(desk: Desk, item: SessionItem) -> dict[str, Any]:
+def _item(desk: Desk, item: SessionItem) -> dict[str, object]:
     what, language, study = item.what, desk.language, desk.session.study
     if isinstance(what, PlannedTrial | PracticeDrives):
         return _drive(desk, item)
@@ -124,7 +123,7 @@ def _item(desk: Desk, item: SessionItem) -> dict[str, Any]:
     return questions
 
 
-def _drive(desk: Desk, item: SessionItem) -> dict[str, Any]:
+def _drive(desk: Desk, item: SessionItem) -> dict[str, object]:
     state, what = desk.drives.state, item.what
     if state.phase not in (DrivePhase.READY, *UNDER_WAY) or state.item != item.id:
         return {'show': 'wait', 'why': 'failed' if state.phase == DrivePhase.FAILED
@@ -132,9 +131,10 @@ def _drive(desk: Desk, item: SessionItem) -> dict[str, Any]:
     slow = desk.slow_link
     if slow is not None:
         return {'show': 'wait', 'why': 'slow', 'link': asdict(slow)}
-    drive = {'show': 'drive', 'phase': state.phase.value, 'link': state.link,
-             'attempt': state.attempt, 'awaits_others': state.awaits_others,
-             'practice': isinstance(what, PracticeDrives)}
+    drive: dict[str, object] = {
+        'show': 'drive', 'phase': state.phase.value, 'link': state.link,
+        'attempt': state.attempt, 'awaits_others': state.awaits_others,
+        'practice': isinstance(what, PracticeDrives)}
     if isinstance(what, PlannedTrial):
         # The last trials of a staircase may not be needed, and leave gaps in the numbers.
         drive['number'] = 1 + sum(isinstance(each.what, PlannedTrial)
@@ -230,7 +230,7 @@ def _doubt(excess: Excess) -> dict[str, object]:
             'least': check.least}
 
 
-def _doubts_of(entry: Mapping[str, Any], quality: QualityBounds) -> list[dict[str, object]]:
+def _doubts_of(entry: JournalEntry, quality: QualityBounds) -> list[dict[str, object]]:
     """Return what of a finished drive's values is beyond a bound, without what is no number."""
     values = {name: value for name, value in (entry.get('quality') or {}).items()
               if isinstance(value, int | float) and math.isfinite(value)}

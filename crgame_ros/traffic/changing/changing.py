@@ -4,7 +4,7 @@
 
 from dataclasses import dataclass
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.traffic.changing.courtesy import (
     CourtesyRules,
@@ -211,9 +211,8 @@ class Wish:
         """Return some of them."""
         if rows.all():
             return self
-        columns: list[Any] = [column[rows] for column in self.beside]
         return Wish(self.slots[rows], self.side[rows], self.urgency[rows], self.room[rows],
-                    Beside(*columns))
+                    Beside._make(column[rows] for column in self.beside))
 
 
 class LaneChanges:
@@ -337,8 +336,7 @@ class LaneChanges:
         taken: list[tuple[int, float]] = []
         row = np.flatnonzero(chosen)
         for i in row[np.lexsort((wish.slots[row], -gain[row]))].tolist():
-            slot, lane, s = (int(wish.slots[i]), int(wish.beside.lane[i]),
-                             float(wish.beside.s[i]))
+            slot, lane, s = (int(wish.slots[i]), int(wish.beside.lane[i]), float(wish.beside.s[i]))
             room = 10.0 + float(agents.length[slot]) + float(agents.speed[slot])
             if slot in begun or any(lane == other and abs(s - at) < room for other, at in taken):
                 continue

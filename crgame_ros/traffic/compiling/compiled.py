@@ -17,9 +17,7 @@ def vectorized(function: Callable[..., float]) -> Callable[..., NDArray[np.float
     """Compile a function of numbers [float64] into one of arrays that broadcast."""
     _choose_cache(function)
     count = function.__code__.co_argcount
-    result: Callable[..., NDArray[np.float64]] = numba.vectorize(
-        [numba.float64(*[numba.float64] * count)], cache=True)(function)
-    return result
+    return numba.vectorize([numba.float64(*[numba.float64] * count)], cache=True)(function)
 
 
 def _choose_cache(function: Callable[..., object]) -> None:

@@ -3,7 +3,7 @@
 """The parts of lanes that vehicles, people and obstacles take."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.traffic.compiling.compiled import bare, compiled, inlined
 from crgame_ros.traffic.lanes.lane_cells import cell_of, CellTable
@@ -99,8 +99,7 @@ class Entries(NamedTuple):
 
     def select(self, rows: IntArray) -> 'Entries':
         """Return some of them, with an empty `begin`."""
-        columns: list[Any] = [column[rows] for column in self[1:]]
-        return Entries(np.empty(0, np.int64), *columns)
+        return Entries._make((np.empty(0, np.int64), *(column[rows] for column in self[1:])))
 
 
 @compiled
