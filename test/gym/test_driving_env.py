@@ -54,6 +54,12 @@ def test_shared_placements_of_traffic_begin_as_if_unused() -> None:
     assert episode(env, 1, 10) == first
 
 
+def test_a_placement_that_is_kept_drives_as_a_new_one() -> None:
+    """There are so many that no two seeds share one."""
+    kept = DrivingEnv(game='dense_merge', worlds=2**62)
+    assert episode(kept, 1, 10) == episode(DrivingEnv(game='dense_merge'), 1, 10)
+
+
 def _run(seat: str) -> OfflineResult:
     game = load_game(SCENARIOS / 'lane_change.yaml')
     assert game.avs is not None

@@ -166,8 +166,7 @@ class Agents(AgentTable):
     def __init__(self, descriptions: Sequence[ObjectDescription]) -> None:
         self.count = len(descriptions)
         self.table = empty_table(self.count)
-        for name in AgentTable.__annotations__:
-            setattr(self, name, np.asarray(self.table)[name])
+        self._show_columns()
         self.length[:] = [x.shape.length for x in descriptions]
         self.width[:] = [x.shape.width for x in descriptions]
         self.wheelbase[:] = WHEELBASE * self.length
@@ -179,6 +178,20 @@ class Agents(AgentTable):
         for name in ('source', 'grant', 'until', 'before', 'before_until', 'previous'):
             getattr(self, name)[:] = NONE
         self.leader[:] = self.blocker[:] = FREE
+
+    def _show_columns(self) -> None:
+        for name in AgentTable.__annotations__:
+            setattr(self, name, np.asarray(self.table)[name])
+
+    def __getstate__(self) -> dict[str, object]:
+        """Return what a copy is made of: columns are views, which a copy has of its own table."""
+        return {name: value for name, value in vars(self).items()
+                if name not in AgentTable.__annotations__}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Become a copy."""
+        vars(self).update(state)
+        self._show_columns()
 
     def centers(self) -> FloatArray:
         """Return the poses (A, 3) of the centres [m, rad]."""
