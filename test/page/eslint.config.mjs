@@ -3,10 +3,9 @@
 /** Rules of eslint for the page and its tests; tsc checks types (tsconfig.json). */
 
 import js from '@eslint/js';
+import { transformSync } from 'amaro';
 import * as espree from 'espree';
 import globals from 'globals';
-
-import { withoutTypes } from './ts_hooks.mjs';
 
 export default [
   js.configs.recommended,
@@ -44,7 +43,8 @@ export default [
     files: ['page/**/*.ts'],
     // Types are the matter of tsc; without them, lines and columns are the same.
     languageOptions: { globals: globals.browser, parser: {
-      parse: (text, options) => espree.parse(withoutTypes(text), options) } },
+      parse: (text, options) => (
+        espree.parse(transformSync(text, { mode: 'strip-only' }).code, options)) } },
   },
   {
     files: ['test/page/**/*.mjs'],

@@ -18,12 +18,13 @@ pytestmark = pytest.mark.xdist_group('test_lint')
 
 PAGE = ROOT / 'page'
 MAX_COLUMNS = 99
-# Prints named files without types, as a list.
+UNITS = sorted(HERE.glob('*.test.mjs'))
+# Prints named files without types, as a list, by the implementation in Node itself.
 STRIP = """
 import { readFileSync } from 'node:fs';
-import { withoutTypes } from './ts_hooks.mjs';
+import { transformSync } from 'amaro';
 console.log(JSON.stringify(process.argv.slice(1).map((file) => (
-  withoutTypes(readFileSync(file, 'utf8'))))));
+  transformSync(readFileSync(file, 'utf8'), { mode: 'strip-only' }).code))));
 """
 
 
@@ -31,6 +32,10 @@ console.log(JSON.stringify(process.argv.slice(1).map((file) => (
 def tools() -> Path:
     """Return the folder of the tools pinned by package-lock.json."""
     return installed_tools()
+
+
+def _scripts() -> list[Path]:
+    return [path for path in sorted(PAGE.rglob('*.ts')) if not path.name.endswith('.d.ts')]
 
 
 def check_types(root: Path) -> None:
@@ -60,13 +65,29 @@ def test_rules() -> None:
     check_rules(ROOT)
 
 
+@pytest.fixture(scope='module')
+def served(tools: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the page's scripts as the server sends them, and the unit tests."""
+    root = tmp_path_factory.mktemp('served')
+    for path in _scripts():
+        script = root / path.relative_to(ROOT).with_suffix('.js')
+        script.parent.mkdir(parents=True, exist_ok=True)
+        script.write_bytes(strip_types(path.read_bytes(), path.name))
+    tests = root / HERE.relative_to(ROOT)
+    tests.mkdir(parents=True)
+    for path in (*HERE.glob('*.mjs'), HERE / 'package.json'):
+        shutil.copy(path, tests)
+    (tests / 'node_modules').symlink_to(tools)
+    # Tests of the desk read its words there.
+    (root / 'crgame_ros').symlink_to(ROOT / 'crgame_ros')
+    return tests
+
+
 @pytest.mark.slow
-@pytest.mark.usefixtures('tools')
-def test_units() -> None:
-    """The unit tests without a browser pass in Node's own runner."""
-    files = sorted(HERE.glob('*.test.mjs'))
-    assert len(files) > 10
-    run('node', '--import', HERE / 'ts_loader.mjs', '--test', *files)
+@pytest.mark.parametrize('name', [path.name for path in UNITS])
+def test_unit(name: str, served: Path) -> None:
+    """A file of unit tests without a browser passes in Node's own runner."""
+    run('node', '--test', served / name)
 
 
 @pytest.mark.exhaustive
@@ -81,7 +102,7 @@ def test_the_checks_see(tools: Path, tmp_path: Path, check: Callable[[Path], Non
     shutil.copytree(PAGE, tmp_path / 'page')
     here = tmp_path / HERE.relative_to(ROOT)
     here.mkdir(parents=True)
-    for name in ('tsconfig.json', 'globals.d.ts', 'eslint.config.mjs', 'ts_hooks.mjs'):
+    for name in ('tsconfig.json', 'globals.d.ts', 'eslint.config.mjs'):
         shutil.copy2(HERE / name, here)
     (here / 'node_modules').symlink_to(tools)
     (tmp_path / 'page' / 'desk' / 'js' / 'wrong.ts').write_text(code, encoding='utf-8')
@@ -96,7 +117,7 @@ def test_the_checks_see(tools: Path, tmp_path: Path, check: Callable[[Path], Non
 @pytest.mark.usefixtures('tools')
 def test_the_server_takes_out_types_as_node_does() -> None:
     """Every script has the same words on the same lines."""
-    files = [path for path in sorted(PAGE.rglob('*.ts')) if not path.name.endswith('.d.ts')]
+    files = _scripts()
     assert len(files) > 200
     for path, wanted in zip(files, json.loads(run(
             'node', '--input-type=module', '--eval', STRIP, *files, cwd=HERE)), strict=True):
