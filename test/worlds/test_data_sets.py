@@ -62,7 +62,7 @@ def crgame(*words: object) -> 'subprocess.Popen[str]':
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-@pytest.mark.matrix('highd', 'ind', 'interaction', 'sind', 'mona')
+@pytest.mark.matrix('interaction', 'mona')
 @pytest.mark.parametrize('name', FORMATS)
 def test_vehicles_are_where_the_data_have_them(name: str, maps: Path, tmp_path: Path) -> None:
     """Each is at its place to 1 cm, with its time, speed, type and size; and one can drive."""
@@ -168,6 +168,7 @@ def test_files_are_the_same_again_and_stay(recording: Path, maps: Path, tmp_path
     assert first.read_bytes() == dict(two)[first.name]
 
 
+@pytest.mark.exhaustive
 def test_frames_are_left_out(recording: Path, maps: Path, tmp_path: Path) -> None:
     """With --downsample 2 every other frame of the recording remains."""
     every, other = (load_scenario(convert(recording, tmp_path / str(factor), downsample=factor,
