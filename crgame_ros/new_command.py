@@ -11,6 +11,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.library.lookup import find_scenario
 from crgame_ros.library.stored_index import is_kept
 from crgame_ros.whole_file import write_bytes, write_text
+from crgame_ros.yaml_text import parse_yaml
 
 if TYPE_CHECKING:
     from crgame_ros.game.game import Game, PoseSpawn
@@ -46,10 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _new(values: argparse.Namespace) -> int:
     from crgame_ros.driver.source import parse_source
+    from crgame_ros.game.game import parse_game
+    from crgame_ros.planner.registry import EXTERNAL, planner_class
     from crgame_ros.simulation.setup import build_setup
     if not 1 <= values.humans <= MAX_HUMANS:
         raise InputError(f'is {values.humans}', '--humans', f'give 1 to {MAX_HUMANS}')
     parse_source(values.driver)
+    if values.planner not in (None, EXTERNAL):
+        planner_class(values.planner)
     out = values.out or Path(f'{values.scenario.stem}.yaml')
     if out.exists():
         raise InputError('is there already', str(out), 'remove it, or name another with --out')
@@ -64,6 +69,8 @@ def _new(values: argparse.Namespace) -> int:
                    title=game.title or f'{setup.loaded.benchmark_id}, {len(humans)} in seats')
     # Place the vehicles as a reader of the file will.
     build_setup(game, setup.loaded)
+    # No file is written that cannot be read.
+    parse_game(parse_yaml(game.dump(), str(out)), str(out), Path())
     if is_kept(game.scenario):
         # A cache may be emptied: what came out of an archive goes with the game.
         write_bytes(game.scenario.read_bytes(), beside)

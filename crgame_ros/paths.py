@@ -34,6 +34,19 @@ def share_directory() -> Path:
                       'install with colcon or `pip install .`, or run from the source tree')
 
 
+def expanded(name: str | Path) -> Path:
+    """
+    Return a path in which a leading `~` or `~NAME` is the home folder of that user.
+
+    :raises InputError: if there is no such user.
+    """
+    try:
+        return Path(name).expanduser()
+    except RuntimeError as error:
+        raise InputError('is in the home folder of nobody here', str(name),
+                         'write out where it is') from error
+
+
 def numbered(wanted: Path) -> Iterator[Path]:
     """Yield a name, then the same with _2, _3, …, so that existing files stay as they are."""
     yield wanted
@@ -115,7 +128,7 @@ def find_game(name: Path) -> Path:
 
     :raises InputError: if it is neither.
     """
-    if name.suffix or len(name.parts) > 1 or name.exists():
+    if name.suffix or len(name.parts) > 1 or name.is_file():
         return name
     own = {path.stem: path for path in scenarios_directory().glob('*.yaml')
            if '.' not in path.stem}

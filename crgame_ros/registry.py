@@ -235,7 +235,7 @@ def _checked_options(found: type[object], options: Mapping[str, object],
                                  'take ' + ', '.join(given) + ' beside its options')
     parameters = {key: parameter for key, parameter in named.items() if key not in given}
     allowed = ', '.join(parameters) or 'none'
-    hints = get_type_hints(found.__init__)
+    hints = hints_of(found, label)
     checked = {}
     for key, value in options.items():
         if key not in parameters:
@@ -245,6 +245,20 @@ def _checked_options(found: type[object], options: Mapping[str, object],
         if parameter.default is parameter.empty and key not in checked:
             raise InputError(f'"{key}" is missing', where, f'allowed are: {allowed}')
     return checked
+
+
+def hints_of(found: type[object], label: str) -> dict[str, object]:
+    """
+    Return the hints of a constructor, by argument.
+
+    :param label: description of the class in messages.
+    :raises InputError: if they name what is not there, such as an import for type checkers alone.
+    """
+    try:
+        return get_type_hints(found.__init__)
+    except Exception as error:
+        raise InputError(f'its hints cannot be read ({type(error).__name__}: {error})', label,
+                         'import at run time what they name') from error
 
 
 def _checked(value: object, hint: object, key: str, where: str, allowed: str) -> object:

@@ -9,12 +9,12 @@ import gc
 import json
 from pathlib import Path
 import re
-import subprocess
 import sys
 from typing import TYPE_CHECKING
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.paths import numbered
+from crgame_ros.whole_file import write_text
 
 if TYPE_CHECKING:  # Not loaded at the start: other commands do not need the engine.
     from crgame_ros.analysis.counterfactual import Alternative
@@ -85,8 +85,7 @@ def replay(values: argparse.Namespace) -> int:
                                 f'{alternative.planner}: ', scores))
         found.append(alternative.as_dict())
         # Written after each, so that a failure loses none of the others.
-        (folder / 'comparison.json').write_text(
-            json.dumps(found, indent=2) + '\n', encoding='utf-8')
+        write_text(json.dumps(found, indent=2) + '\n', folder / 'comparison.json')
     # Free the planners' reference cycles, which compiled packages would report as leaks at the
     # end.
     gc.collect()
@@ -99,6 +98,8 @@ def _check(values: argparse.Namespace) -> None:
     """Check that the arguments fit together."""
     if values.latency < 0:
         raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
+    # Named twice, it is driven once.
+    values.planner = list(dict.fromkeys(values.planner))
     if values.live and (values.latency or values.human != 'inputs'):
         raise InputError('always repeats the inputs, with real computing times', '--live',
                          'leave --latency and --human out')
@@ -133,18 +134,19 @@ def _live(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories') ->
     """Replay against each planner in real time, one graph after the other."""
     from crgame_ros.analysis.counterfactual import driven_live
     from crgame_ros.analysis.outcome_line import NO_PLANS
+    from crgame_ros.launcher.interruption import run_to_its_end
     folder = _make_folder(values.out, values.run)
     duration_s = (len(recorded.ks) - 1) * recorded.game.scheduler.time_step_s
 
     def runs() -> Iterator['Alternative']:
         for name in values.planner:
             run = folder / _file_name(name, values.planner)
-            done = subprocess.run([
+            code = run_to_its_end([
                 sys.executable, '-m', 'crgame_ros.launcher.main', '--driver', f'replay:{bag}',
                 '--planner', name, '--duration', repr(duration_s), '--out', str(run),
-                *(['--headless'] if values.headless else [])], stdin=subprocess.DEVNULL)
-            if done.returncode not in (0, NO_PLANS):
-                raise CrgameError(f'the run against {name} ended with {done.returncode}; '
+                *(['--headless'] if values.headless else [])])
+            if code not in (0, NO_PLANS):
+                raise CrgameError(f'the run against {name} ended with {code}; '
                                   f'what it said is above, its files are in {run}')
             yield driven_live(name, run, recorded)
 

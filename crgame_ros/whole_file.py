@@ -70,6 +70,8 @@ def whole_folder(path: Path) -> Iterator[Path]:
     """
     part = part_of(path)
     try:
+        # What a process with the same number has left is not this one's.
+        shutil.rmtree(part, ignore_errors=True)
         part.mkdir()
         yield part / path.name
         before = part / 'before'

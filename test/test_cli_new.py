@@ -44,15 +44,20 @@ def test_people_start_where_problems_begin(tmp_path: Path) -> None:
 @pytest.mark.parametrize(('words', 'said'), [
     (['--humans', '0'], '--humans: is 0; give 1 to 16'),
     (['--driver', 'telepathy'], 'no driver source'),
+    (['--planner', 'telepathy'], 'no planner "telepathy"'),
+    (['--out', 'new.yaml', '--duration', '-5'], 'new.yaml: "duration" is -5'),
+    (['--out', 'new.yaml', '--duration', 'nan'], 'new.yaml: "duration" is nan'),
     (['--out', str(TWO_AVS)], 'is there already')])
 def test_what_cannot_be_written_is_said_in_one_line(
-        words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """The exit code is 2, and no file is overwritten."""
+        words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    """The exit code is 2, and no file is written."""
+    monkeypatch.chdir(tmp_path)
     before = TWO_AVS.read_bytes()
     assert main(['new', str(TWO_AVS), *words]) == 2
     error = capsys.readouterr().err
     assert said in error and error.count('\n') == 1
-    assert TWO_AVS.read_bytes() == before
+    assert TWO_AVS.read_bytes() == before and not list(tmp_path.iterdir())
 
 
 def test_the_example_for_two_is_a_game() -> None:

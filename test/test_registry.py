@@ -40,6 +40,10 @@ class Narrow(Straight):
     def __init__(self, vehicle): pass
 
 
+class Hinted(Straight):
+    def __init__(self, vehicle: 'Car', dt_s: float) -> None: pass
+
+
 class Half(Tracker):
     def reset(self): pass
 """
@@ -118,8 +122,10 @@ def test_wrong_options_are_refused_with_their_place(
     ('missing.py:Lqr', 'there is no file missing.py'),
     ('{file}:Half', 'does not define control; see docs/control.md'),
     ('{file}:Narrow', 'its constructor does not take "dt_s"'),
+    ('{file}:Hinted', "its hints cannot be read (NameError: name 'Car' is not defined)"),
     ('{file}:Straight', '"push" is missing; allowed are: push, mode')],
-    ids=['name', 'other class', 'module', 'file', 'abstract', 'constructor', 'missing option'])
+    ids=['name', 'other class', 'module', 'file', 'abstract', 'constructor', 'hints',
+         'missing option'])
 def test_unusable_classes_are_refused(registry: ModelRegistry, file: str, name: str,
                                       message: str) -> None:
     with pytest.raises(InputError, match=re.escape(message)) as caught:

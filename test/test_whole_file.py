@@ -9,7 +9,7 @@ import time
 
 from crgame_ros.recording.writer import BagWriter
 from crgame_ros.study.session_journal import JOURNAL, SessionJournal
-from crgame_ros.whole_file import whole_folder, write_whole
+from crgame_ros.whole_file import part_of, whole_folder, write_whole
 import pytest
 
 
@@ -53,6 +53,8 @@ def test_what_cannot_be_written_leaves_what_was_there(tmp_path: Path) -> None:
 
 def test_a_folder_is_replaced_once_the_new_one_is_whole(tmp_path: Path) -> None:
     path = tmp_path / 'folder'
+    # An earlier process of the same number was killed.
+    (part_of(path) / 'folder').mkdir(parents=True)
     for content in ('old', 'new'):
         with whole_folder(path) as part:
             part.mkdir()

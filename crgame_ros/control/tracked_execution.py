@@ -53,11 +53,12 @@ class TrackedExecution:
         self.model = model
         self.dt_s = dt_s
         self._errors: TrackingErrors | None = None
+        self._worst = [0.0, 0.0, 0.0, 0.0]
         self._forget()
 
     def reset(self, state: VehicleState) -> None:
         """
-        Reset for a new run, or for a vehicle that returns from another driver.
+        Forget the plans of a vehicle that another driver has; its worst errors so far stay.
 
         :param state: of the vehicle, rear axle
         """
@@ -96,14 +97,13 @@ class TrackedExecution:
 
     @property
     def worst(self) -> TrackingErrors:
-        """Return the largest absolute errors since the last reset."""
+        """Return the largest absolute errors of the run."""
         return TrackingErrors(*self._worst)
 
     def _forget(self) -> None:
         self._errors = None
         # Plans with the time since the first state of each, the oldest first.
         self._plans: deque[tuple[PlannedTrack, float]] = deque()
-        self._worst = [0.0, 0.0, 0.0, 0.0]
 
     def _braking(self, state: VehicleState) -> Control:
         # The tracker's expectations of the vehicle end here.

@@ -17,7 +17,7 @@ from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, OnlyWith, Special, Within, Wording
 from crgame_ros.schema.reading import read
 from crgame_ros.vehicle.lights import Light
-from crgame_ros.yaml_text import parse_yaml, read_yaml
+from crgame_ros.yaml_text import read_yaml
 from evdev import ecodes
 
 
@@ -277,6 +277,30 @@ class KeyEntry:
     horn: Keys = ()
     put_back: Keys = ()
 
+    @property
+    def codes(self) -> frozenset[int]:
+        """Return every driving key; a device with only these is a keyboard too."""
+        return frozenset((*self.throttle, *self.brake, *self.left, *self.right, *self.reverse))
+
+    @property
+    def lights(self) -> LightButtons:
+        """Return the keys of indicators and horn."""
+        return LightButtons(*map(frozenset, (
+            self.left_indicator, self.right_indicator, self.hazard, self.horn)))
+
+    def held(self, pressed: Set[int], reverse: bool, lights: int = 0) -> KeyState:
+        """
+        Return the driving keys held.
+
+        :param pressed: codes of all pressed keys.
+        :param reverse: whether reverse is selected.
+        :param lights: the lights that are switched on.
+        """
+        return KeyState(not pressed.isdisjoint(self.throttle), not pressed.isdisjoint(self.brake),
+                        not pressed.isdisjoint(self.left), not pressed.isdisjoint(self.right),
+                        reverse, bool(lights & Light.LEFT), bool(lights & Light.RIGHT),
+                        bool(lights & Light.HORN), not pressed.isdisjoint(self.put_back))
+
 
 @dataclass(frozen=True)
 class DeviceFile:
@@ -344,45 +368,6 @@ class DeviceKind(IntEnum):
 
 
 @dataclass(frozen=True)
-class KeyBindings:
-    """The evdev codes of the driving keys; see `KeyState`."""
-
-    throttle: frozenset[int]
-    brake: frozenset[int]
-    left: frozenset[int]
-    right: frozenset[int]
-    reverse: frozenset[int]
-    left_indicator: frozenset[int] = frozenset()
-    right_indicator: frozenset[int] = frozenset()
-    hazard: frozenset[int] = frozenset()
-    horn: frozenset[int] = frozenset()
-    put_back: frozenset[int] = frozenset()
-
-    @property
-    def codes(self) -> frozenset[int]:
-        """Return every driving key; a device with only these is a keyboard too."""
-        return self.throttle | self.brake | self.left | self.right | self.reverse
-
-    @property
-    def lights(self) -> LightButtons:
-        """Return the keys of indicators and horn."""
-        return LightButtons(self.left_indicator, self.right_indicator, self.hazard, self.horn)
-
-    def held(self, pressed: Set[int], reverse: bool, lights: int = 0) -> KeyState:
-        """
-        Return the driving keys held.
-
-        :param pressed: codes of all pressed keys.
-        :param reverse: whether reverse is selected.
-        :param lights: the lights that are switched on.
-        """
-        return KeyState(not self.throttle.isdisjoint(pressed), not self.brake.isdisjoint(pressed),
-                        not self.left.isdisjoint(pressed), not self.right.isdisjoint(pressed),
-                        reverse, bool(lights & Light.LEFT), bool(lights & Light.RIGHT),
-                        bool(lights & Light.HORN), not self.put_back.isdisjoint(pressed))
-
-
-@dataclass(frozen=True)
 class DeviceMap:
     """
     One file of `config/devices/`.
@@ -393,7 +378,7 @@ class DeviceMap:
     :param patterns: regular expressions; one of them is found in the device's name.
     :param evdev: controls when read through evdev; None for a keyboard.
     :param joy: controls when read from a `joy` node; None for a keyboard.
-    :param keys: key bindings of a keyboard; None otherwise.
+    :param keys: keys of a keyboard, as evdev codes; None otherwise.
     :param force: the motor of a wheel; None where there is none, or it is not to be used.
     """
 
@@ -403,7 +388,7 @@ class DeviceMap:
     patterns: tuple[str, ...]
     evdev: ControlBindings | None = None
     joy: ControlBindings | None = None
-    keys: KeyBindings | None = None
+    keys: KeyEntry | None = None
     force: ForceLimits | None = None
 
     def fits(self, name: str, axes: frozenset[int], buttons: frozenset[int]) -> bool:
@@ -449,23 +434,7 @@ def load_device_map(name: str) -> DeviceMap:
     if not path.exists():
         known = ', '.join(sorted(known.stem for known in folder.glob('*.yaml')))
         raise InputError('there is no such device map', str(path), f'the maps are {known}')
-    return _device_map(read_yaml(path, 'device map', REMEDY), str(path))
-
-
-def parse_device_map(text: str, where: str) -> DeviceMap:
-    """
-    Read the text of a device map; `docs/driving.md` describes it.
-
-    :param where: the file's name, for messages; its stem becomes the map's name.
-    :raises InputError: naming the file and the key that is wrong.
-    """
-    return _device_map(parse_yaml(text, where, REMEDY), where)
-
-
-def _device_map(values: object, where: str) -> DeviceMap:
-    file = read(DeviceFile, values, where)
+    file = read(DeviceFile, read_yaml(path, 'device map', REMEDY), str(path))
     evdev, joy = file.controls() or (None, None)
-    keys = None if file.keys is None else KeyBindings(
-        **{name: frozenset(codes) for name, codes in vars(file.keys).items()})
-    return DeviceMap(Path(where).stem, file.title, DeviceKind[file.kind.upper()], file.match,
-                     evdev, joy, keys, file.force_feedback)
+    return DeviceMap(path.stem, file.title, DeviceKind[file.kind.upper()], file.match,
+                     evdev, joy, file.keys, file.force_feedback)

@@ -273,7 +273,7 @@ class EvdevDevice:
             self._buttons = tuple(device.capabilities().get(ecodes.EV_KEY, ()))
             self._can_push = ecodes.FF_CONSTANT in device.capabilities().get(ecodes.EV_FF, ())
             if device_map.keys is not None:
-                gear, self.layout = GearButtons(toggle=device_map.keys.reverse), None
+                gear, self.layout = GearButtons(toggle=frozenset(device_map.keys.reverse)), None
                 lights = device_map.keys.lights
             else:
                 assert device_map.evdev is not None

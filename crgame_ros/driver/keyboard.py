@@ -132,15 +132,6 @@ class KeyboardFilter:
             0.0 if abs(state.steering) < p.steering_deadband else state.steering,
             state.reverse, state.lights, state.put_back)
 
-    def advance(self, keys: KeyState, dt_s: float) -> DriverCommand:
-        """Commit a cycle with these keys held, and return its command."""
-        self.state = self.advanced(self.state, keys, dt_s)
-        return self.command(self.state)
-
-    def preview(self, keys: KeyState, dt_s: float) -> DriverCommand:
-        """Return the command of the coming cycle from the last committed state, uncommitted."""
-        return self.command(self.advanced(self.state, keys, dt_s))
-
 
 class KeyboardCycles:
     """

@@ -21,6 +21,7 @@ from crgame_ros.driver.timeline import (
 from crgame_ros.driver.watchdog import SeatWatchdog
 from crgame_ros.driver.wheel import IndicatorLever, JoyState, normalize, RawInput, reported
 from crgame_ros.errors import InputError
+from crgame_ros.paths import expanded
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ def load_timeline(spec: SourceSpec, base: Path) -> Timeline:
     :param base: directory against which its file is resolved.
     :raises InputError: if the file is missing, wrong, or of the other kind.
     """
-    path = base / Path(spec.argument).expanduser()
+    path = base / expanded(spec.argument)
     timeline = read_timeline(path)
     kind = 'keys' if isinstance(timeline, KeyTimeline) else 'joy'
     if kind != spec.kind:
@@ -387,5 +388,5 @@ class ReplayDriver(DriverSource):
 
 def _command(row: list[float]) -> DriverCommand:
     throttle, brake, steering, reverse, *switches = row
-    lights, put_back = (*(each if each == each else 0.0 for each in switches), 0.0, 0.0)[:2]
+    lights, put_back = (*(each if abs(each) <= 255.0 else 0.0 for each in switches), 0.0, 0.0)[:2]
     return DriverCommand(throttle, brake, steering, reverse == 1.0, int(lights), put_back == 1.0)

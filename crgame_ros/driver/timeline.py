@@ -32,11 +32,8 @@ _KEPT = 32
 REMEDY = 'see docs/driving.md, section "Scripted drivers"'
 _FORM = Form(REMEDY)
 Time = Annotated[float, Within(0.0, MAX_TIME_S)]
-LightName = Literal['left_indicator', 'right_indicator', 'horn', 'put_back']
-KeyName = Literal['throttle', 'brake', 'left', 'right', 'reverse', 'left_indicator',
-                  'right_indicator', 'horn']
-_SWITCHES: tuple[Literal['reverse', 'put_back'] | LightName, ...] = (
-    'reverse', *get_args(LightName), 'put_back')
+SwitchName = Literal['reverse', 'left_indicator', 'right_indicator', 'horn', 'put_back']
+KeyName = Literal['throttle', 'brake', 'left', 'right', SwitchName]
 
 
 @dataclass(frozen=True)
@@ -68,7 +65,8 @@ class KeyTimeline:
           - {from: 6.0, to: 8.0, hold: [throttle, reverse]}
 
     The keys are throttle, brake, left and right; reverse requests the gear while held;
-    left_indicator, right_indicator and horn are on while held.
+    left_indicator, right_indicator and horn are on while held; put_back asks to be put back on the
+    lane.
     """
 
     intervals: tuple[KeyInterval, ...]
@@ -250,7 +248,7 @@ class JoyEntry:
             tuple(point[0] for point in self.points),
             tuple((values.get('throttle', 0.0), values.get('brake', 0.0),
                    values.get('steering', 0.0)) for values in at),
-            KeyTimeline(tuple(span.interval((name,)) for name in _SWITCHES
+            KeyTimeline(tuple(span.interval((name,)) for name in get_args(SwitchName)
                               for span in getattr(self, name))))
 
 
@@ -306,7 +304,7 @@ def timeline_text(timeline: Timeline) -> str:
                                                     strict=True))
         held: dict[str, Any] = {
             name: tuple(Span(*_seconds(each)) for each in timeline.held.intervals
-                        if name in each.keys) for name in _SWITCHES}
+                        if name in each.keys) for name in get_args(SwitchName)}
         document = {'joy': write(JoyEntry(points=tuple(points), **held))}
     return str(yaml.safe_dump(document, default_flow_style=None, sort_keys=False, width=1000))
 

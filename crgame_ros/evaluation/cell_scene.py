@@ -18,6 +18,7 @@ from crgame_ros.evaluation.source_digest import code_neighbours, MOST_BYTES, pla
 from crgame_ros.game.game import Game, load_game
 from crgame_ros.game.variation_spec import Dimension, EXPECT, VARY
 from crgame_ros.occupancy.map_file import read_map_file
+from crgame_ros.paths import expanded
 from crgame_ros.recording.recorded_game import (
     read_recorded_game,
     read_run_events,
@@ -267,7 +268,7 @@ def files_of(names: tuple[str, ...], base: Path, suffixes: tuple[str, ...],
     """
     found: list[Path] = []
     for name in names:
-        path = base / Path(name).expanduser()
+        path = base / expanded(name)
         if path.is_dir():
             inside = sorted(item for item in path.iterdir() if item.suffix in suffixes)
             if not inside:
@@ -289,7 +290,7 @@ def runs_of(names: tuple[str, ...], base: Path) -> list[Path]:
     """
     found: list[Path] = []
     for name in names:
-        path = base / Path(name).expanduser()
+        path = base / expanded(name)
         inside = sorted(item.parent for item in path.glob('*/bag'))
         if not path.exists():
             raise InputError('there is no such file or folder', str(path), 'check the path')

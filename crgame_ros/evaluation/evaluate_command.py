@@ -15,7 +15,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.evaluation.file_names import GRID_FILE, REPORTS, SEARCH_FILE
 from crgame_ros.game.variation_spec import Sampling
 from crgame_ros.library.lookup import names_file
-from crgame_ros.paths import find_game, make_folder
+from crgame_ros.paths import expanded, find_game, make_folder
 from crgame_ros.schema.marks import named_file
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ def _from_here(key: str, name: str) -> str:
     """Return a name of the command line that is valid beside the plan's file."""
     if key == 'scenarios' and not names_file(name):
         return name
-    return str(Path(name).expanduser().resolve())
+    return str(expanded(name).resolve())
 
 
 def _given(values: argparse.Namespace) -> dict[str, object]:
@@ -222,7 +222,7 @@ def _given(values: argparse.Namespace) -> dict[str, object]:
         files = getattr(values, name)
         if files:
             given[name] = {Path(file).stem: file if file == 'own' else
-                           str(Path(file).expanduser().resolve()) for file in files}
+                           str(expanded(file).resolve()) for file in files}
     variants = {name: value for name, value in (
         ('number', values.variants), ('sampling', values.sampling)) if value is not None}
     if variants:

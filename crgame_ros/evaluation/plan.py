@@ -11,6 +11,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.game.variation_spec import MOST_VARIANTS, Sampling
+from crgame_ros.paths import expanded
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Advice, Folder, Listed, Named, Within
 from crgame_ros.schema.reading import read
@@ -142,7 +143,7 @@ def _choices(given: Mapping[str, object], kind: type[T], what: str,
         if value is None or value == OWN:
             found[str(label)] = value
         elif isinstance(value, str):
-            file = base / Path(value).expanduser()
+            file = base / expanded(value)
             found[str(label)] = read(kind, read_yaml(file, what), str(file), file.parent)
         else:
             found[str(label)] = read(kind, value, where, base)

@@ -17,6 +17,7 @@ from crgame_ros.game.task_spec import TaskList
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.game.variation_spec import named_uniquely, VariationList
 from crgame_ros.library.lookup import find_scenario
+from crgame_ros.paths import expanded
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import (
     Advice,
@@ -79,7 +80,7 @@ class DriverName(Named):
         kind, colon, argument = name.partition(':')
         if not colon or kind == 'evdev':
             return name
-        return f'{kind}:{(base / Path(argument).expanduser()).resolve()}'
+        return f'{kind}:{(base / expanded(argument)).resolve()}'
 
 
 class ScenarioFile(Sought):

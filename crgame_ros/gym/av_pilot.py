@@ -7,7 +7,7 @@ from crgame_ros.messages.plan import Plan
 from crgame_ros.perception.perception import Perception
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.policy.seat_view import RequestView, SeatView, Surrounded
-from crgame_ros.simulation.av_models import make_perception, published_states
+from crgame_ros.simulation.av_models import published_states
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
@@ -43,7 +43,7 @@ class AvPilot:
         self._reader = RequestReader(av.id, objects, simulation.scheduler)
         self._request_view = RequestView(av.id, objects)
         initial = published_states([av.state])[0]
-        self.perception = make_perception(
+        self.perception = Perception(
             av.id, av.spec.perception, setup.descriptions, av.vehicle, av.transform,
             VehicleState(*initial.tolist()), setup.game.seed, simulation.scheduler.dt_s,
             setup.open_occupancy())

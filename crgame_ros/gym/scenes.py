@@ -14,7 +14,7 @@ from crgame_ros.gym.episode_options import game_at
 from crgame_ros.gym.episode_setups import EpisodeSetups, StartVariation
 from crgame_ros.library.lookup import find_scenario
 from crgame_ros.library.stored_index import HEAD_BYTES, header_id
-from crgame_ros.paths import scenarios_directory
+from crgame_ros.paths import expanded, scenarios_directory
 import numpy as np
 
 SPLITS = ('train', 'test', 'all')
@@ -76,7 +76,7 @@ def one_scene(game: Game | Path | str | None, scenario: Path | str | None,
     :raises InputError: if the file cannot be read.
     """
     if scenario is not None:
-        chosen = scenario_game(find_scenario(Path(scenario).expanduser()), seats)
+        chosen = scenario_game(find_scenario(expanded(scenario)), seats)
     elif isinstance(game, Game):
         chosen = game
     else:
@@ -105,7 +105,7 @@ def folder_scenes(folder: Path | str, split: str, test_share: float,
     if not 0.0 <= test_share <= 1.0:
         raise InputError(f'"test_share" is {test_share!r}', 'environment',
                          'give a share from 0 to 1')
-    folder = Path(folder).expanduser()
+    folder = expanded(folder)
     if not folder.is_dir():
         raise InputError('there is no such folder', str(folder), 'name a folder of scenes')
     games = {path.name: load_game(path) for path in sorted(folder.iterdir())
@@ -167,7 +167,7 @@ def _file(game: Path | str) -> Path:
     shipped = scenarios_directory() / f'{game}.yaml'
     if isinstance(game, str) and '/' not in game and shipped.is_file():
         return shipped
-    return Path(game).expanduser()
+    return expanded(game)
 
 
 def _check_head(path: Path) -> None:

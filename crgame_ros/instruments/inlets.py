@@ -49,9 +49,16 @@ class Inlet:
     :param info: as the resolver has found it.
     :param number: of the stream.
     :ivar described: whether names and units of its channels have come.
+    :ivar lost: whether the stream is gone, and not recovered by liblsl.
     """
 
     def __init__(self, info: 'StreamInfo', number: int) -> None:
+        self.samples = 0
+        self._number, self._connection = number, -1
+        self.connect(info)
+
+    def connect(self, info: 'StreamInfo') -> None:
+        """Connect to a stream, or once more to one that was lost: its clock may be another."""
         import pylsl
         self.uid: str = info.uid()
         count: int = info.channel_count()
@@ -59,16 +66,15 @@ class Inlet:
                  pylsl.cf_string: 'string', pylsl.cf_int8: 'int8', pylsl.cf_int16: 'int16',
                  pylsl.cf_int32: 'int32', pylsl.cf_int64: 'int64'}
         self.stream = InstrumentStream(
-            number, _plain(info.name()), _plain(info.type()),
+            self._number, _plain(info.name()), _plain(info.type()),
             tuple(f'ch{place + 1}' for place in range(count)), ('',) * count,
             float(info.nominal_srate()), names.get(info.channel_format(), ''),
             _plain(info.source_id()), _plain(info.hostname()))
-        self.samples = 0
         self.offset_s, self.uncertainty_s = _UNKNOWN
-        self._connection = 0
-        self.described = False
-        self._inlet = pylsl.StreamInlet(info, max_buflen=BUFFER_S, recover=True,
-                                        as_numpy=self.stream.format != 'string')
+        self._connection += 1
+        self.described = self.lost = False
+        # Texts come as bytes: pylsl would raise an error at those that are not UTF-8.
+        self._inlet = pylsl.StreamInlet(info, max_buflen=BUFFER_S, recover=True, as_numpy=True)
         _attempt(lambda: self._inlet.open_stream(0.0))
 
     def poll(self) -> list[Batch]:
@@ -85,7 +91,7 @@ class Inlet:
             if not len(stamps):
                 return found
             self.samples += len(stamps)
-            found.append(self._batch(values, np.array(stamps, dtype=np.float64)))
+            found.append(self._batch(values, stamps))
 
     def _describe(self) -> None:
         """Read names and units of the channels, which come after the stream itself."""
@@ -120,7 +126,7 @@ class Inlet:
                                        for value in (self.offset_s, self.uncertainty_s))
             return TextSamples(self.stream.number, tuple(
                 TextTimes(self._connection, stamp, offset_s, uncertainty_s, received_s)
-                for stamp in stamps.tolist()), tuple(tuple(map(_plain, row)) for row in values))
+                for stamp in stamps.tolist()), tuple(tuple(map(_text, row)) for row in values))
         count = len(stamps)
         times = np.column_stack((
             np.full(count, float(self._connection)), stamps, np.full(count, self.offset_s),
@@ -147,16 +153,18 @@ class Inlets:
         self._own, self._first, self._say = set(own), first, say
         predicate = ' or '.join(f'({spec.predicate()})' for spec in specs)
         self._resolver = pylsl.ContinuousResolver(pred=predicate, forget_after=FORGET_S)
-        # By the stream's key; None: gone, and not recovered by liblsl.
-        self._inlets: dict[str, Inlet | None] = {}
+        # By the stream's key, as the streams.
+        self._inlets: dict[str, Inlet] = {}
         self._streams: dict[str, InstrumentStream] = {}
+        # When streams were lost, by their id: the resolver finds them for a while longer.
+        self._gone_s: dict[str, float] = {}
         self._refused: set[str] = set()
         self.changed = True
 
     @property
     def open(self) -> list[Inlet]:  # noqa: A003
         """Return the streams that are connected."""
-        return [inlet for inlet in self._inlets.values() if inlet is not None]
+        return [inlet for inlet in self._inlets.values() if not inlet.lost]
 
     @property
     def streams(self) -> tuple[InstrumentStream, ...]:
@@ -169,7 +177,8 @@ class Inlets:
         for info in self._resolver.results():
             # Without an id of the device, a stream is known by its names.
             key = info.source_id() or f'{info.name()}/{info.type()}/{info.hostname()}'
-            if key not in self._own:
+            gone_s = time.monotonic() - self._gone_s.get(info.uid(), -math.inf)
+            if key not in self._own and gone_s > FORGET_S:
                 found[key] = info
         for key, info in found.items():
             self._note(key, info)
@@ -180,12 +189,13 @@ class Inlets:
         """Return the samples that have come, by stream and in their order."""
         found: list[Batch] = []
         for key, inlet in self._inlets.items():
-            if inlet is None:
+            if inlet.lost:
                 continue
             try:
                 found += inlet.poll()
             except self._lost:
-                self._inlets[key] = None
+                inlet.lost = True
+                self._gone_s[inlet.uid] = time.monotonic()
                 self._leave(key, 'is gone')
                 continue
             stream = self._streams[key]
@@ -196,16 +206,18 @@ class Inlets:
 
     def _note(self, key: str, info: 'StreamInfo') -> None:
         """Note a stream that is there: a new one, one that is back, or as before."""
-        stream, inlet = self._streams.get(key), self._inlets.get(key)
-        if stream is None:
+        if key not in self._streams:
             self._begin(key, info)
             return
+        stream, inlet = self._streams[key], self._inlets[key]
         # On a busy machine, a stream that is still connected may answer too late.
-        goes_on = inlet is not None and inlet.uid == info.uid()
+        goes_on = not inlet.lost and inlet.uid == info.uid()
         if goes_on and stream.here:
             return
-        if inlet is None:
-            self._inlets[key] = inlet = Inlet(info, stream.number)
+        if inlet.uid != info.uid():
+            self._gone_s[inlet.uid] = time.monotonic()
+        if inlet.lost:
+            inlet.connect(info)
         inlet.uid = info.uid()
         gaps = stream.gaps + (not goes_on)
         self._change(key, replace(stream, here=True, gaps=gaps))
@@ -240,7 +252,12 @@ def _title(stream: InstrumentStream) -> str:
 
 def _plain(text: str) -> str:
     """Return text as messages can hold it."""
-    return str(text).encode('utf-8', 'replace').decode('utf-8')[:1000]
+    return _text(str(text).encode('utf-8', 'replace'))
+
+
+def _text(value: bytes) -> str:
+    """Return the text of a sender, which need not be UTF-8."""
+    return value.decode('utf-8', 'replace')[:1000]
 
 
 def _attempt(ask: Callable[[], T]) -> T | None:

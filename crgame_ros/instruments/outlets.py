@@ -143,7 +143,7 @@ def vehicle_stream(vehicle_id: str, rate_hz: float) -> StreamDescription:
 
 
 def driver_stream(vehicle_id: str, rate_hz: float) -> StreamDescription:
-    """Return the stream of a driver's consumed commands, NaN while an AV follows its plan."""
+    """Return the stream of consumed commands, NaN but for lights while an AV follows its plan."""
     return StreamDescription(f'crgame_ros driver {vehicle_id}', 'Driver', tuple(
         Channel(name, 'normalized', 'Control') for name in COMMAND_COLUMNS), rate_hz)
 

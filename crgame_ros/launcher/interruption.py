@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Interruptions of a run: Ctrl-C, another signal, a closed terminal, a broken pipe."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 import os
 import signal
+import subprocess
 import sys
 from types import FrameType
 
@@ -26,6 +27,22 @@ def print_now(text: str) -> None:
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)
         os.kill(os.getpid(), signal.SIGHUP)
+
+
+def run_to_its_end(command: Sequence[str]) -> int:
+    """
+    Run a command on this terminal.
+
+    Ctrl-C reaches it too, and it is left to end in good order: `subprocess.run` would kill it.
+
+    :return: its exit code.
+    """
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL)
+    try:
+        return process.wait()
+    except KeyboardInterrupt:
+        process.wait()
+        raise
 
 
 _RECOVERED = 'still writing the files; once more leaves that to `crgame recover`'

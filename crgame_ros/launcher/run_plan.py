@@ -20,7 +20,7 @@ from crgame_ros.game.game import AvSpec, Game, HumanSpec, load_game, TimingSpec
 from crgame_ros.instruments.extra import require_instruments
 from crgame_ros.launcher.arguments import cockpit_host, RunRequest
 from crgame_ros.library.stored_index import is_kept
-from crgame_ros.paths import check_room, default_game, numbered
+from crgame_ros.paths import check_room, default_game, expanded, numbered
 from crgame_ros.planner.registry import create_planner, EXTERNAL
 from crgame_ros.policy.policy_file import load_policy
 from crgame_ros.recording.recorded_game import (
@@ -191,7 +191,7 @@ def _own_recording(request: RunRequest) -> Path | None:
     if request.driver is None or request.game is not None or request.scenario is not None:
         return None
     source = parse_source(request.driver)
-    return recording_in(Path(source.argument).expanduser()) if source.kind == 'replay' else None
+    return recording_in(expanded(source.argument)) if source.kind == 'replay' else None
 
 
 def _from_here(driver: str) -> str:
@@ -199,7 +199,7 @@ def _from_here(driver: str) -> str:
     kind, colon, argument = driver.partition(':')
     if not colon or kind == 'evdev':
         return driver
-    return f'{kind}:{Path(argument).expanduser().resolve()}'
+    return f'{kind}:{expanded(argument).resolve()}'
 
 
 def plan_run(request: RunRequest, now: Callable[[], datetime] = datetime.now) -> RunPlan:

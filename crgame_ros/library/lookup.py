@@ -13,7 +13,7 @@ from typing import NamedTuple
 from crgame_ros.errors import InputError, one_line
 from crgame_ros.library.index import ArchiveIndex, FolderIndex
 from crgame_ros.library.stored_index import Entry
-from crgame_ros.paths import make_folder, scenarios_directory, user_directory
+from crgame_ros.paths import expanded, make_folder, scenarios_directory, user_directory
 from crgame_ros.whole_file import write_text
 
 _LOGGER = logging.getLogger(__name__)
@@ -208,7 +208,7 @@ def user_places() -> tuple[Path, ...]:
 def variable_places() -> tuple[Path, ...]:
     """Return the places that the environment names; they go before the user's."""
     given = os.environ.get(VARIABLE, '').split(os.pathsep)
-    return tuple(Path(name).expanduser().absolute() for name in given if name)
+    return tuple(expanded(name).absolute() for name in given if name)
 
 
 def all_places() -> tuple[Path, ...]:
@@ -226,7 +226,7 @@ def checked_place(path: Path) -> Path:
 
     :raises InputError: if it is neither.
     """
-    found = path.expanduser().absolute()
+    found = expanded(path).absolute()
     if '\n' in str(found) or not (found.is_dir() or found.is_file() and _is_archive(found)):
         raise InputError('is neither a folder nor an archive' if found.exists()
                          else 'is not there', str(path),
@@ -254,7 +254,7 @@ def drop_place(path: Path) -> Path:
     :return: the place.
     :raises InputError: if it is none of them, or the file of places cannot be written.
     """
-    known, place = user_places(), path.expanduser().absolute()
+    known, place = user_places(), expanded(path).absolute()
     if place not in known:
         raise InputError('is none of the places', str(path),
                          'these are ' + (', '.join(map(str, known)) or 'none: add one'))

@@ -20,7 +20,6 @@ from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
 from crgame_ros.ros.trusted_code import TrustedCode
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
-from crgame_ros.simulation.av_models import make_perception
 from crgame_ros.vehicle.state import VehicleState
 from nav_msgs.msg import Odometry
 import numpy as np
@@ -130,7 +129,7 @@ class PerceptionNode(Node):
         spec = av.perception
         for sensor in spec.sensors:
             self._code.check(sensor.model, f'sensor {sensor.name} of {self._vehicle_id}:')
-        perception = make_perception(
+        perception = Perception(
             self._vehicle_id, spec, scenario.objects, av.vehicle, av.transform, initial, game.seed,
             game.scheduler.dt_s,
             None if game.occupancy is None else TiledOccupancy(game.occupancy))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from crgame_ros.errors import InputError
+from crgame_ros.paths import expanded
 from crgame_ros.policy.actions import ACTION_KINDS, ActionKind, PLANNED_KINDS
 from crgame_ros.policy.observation import Observed
 from crgame_ros.policy.observation_spec import ObservationSpec
@@ -64,7 +65,7 @@ def load_policy(name: str, where: str = '') -> Policy:
     """
     label = f'{where}: {POLICY}{name}' if where else f'{POLICY}{name}'
     file, _, function = name.rpartition(':')
-    path = Path(file).expanduser()
+    path = expanded(file)
     if not file.endswith('.py'):
         raise InputError('does not name a policy', label, f'write {POLICY}FILE.py:load')
     if not path.is_file():

@@ -13,7 +13,7 @@ from crgame_ros.errors import InputError, short
 from crgame_ros.game.game import Game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
-from crgame_ros.paths import default_game
+from crgame_ros.paths import default_game, expanded
 from crgame_ros.planner.interface import Planner
 
 _NAMES = {'--planner': 'planner', '--driver': 'driver', '--problem': 'problems',
@@ -66,7 +66,7 @@ def as_path(path: object, where: str) -> Path:
     :raises InputError: if it is not a path.
     """
     if isinstance(path, str | PathLike) and isinstance(text := fspath(path), str) and text:
-        return Path(text).expanduser()
+        return expanded(text)
     raise InputError(f'is {short(path)}', where, 'give the name of a file or folder')
 
 

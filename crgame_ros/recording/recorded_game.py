@@ -12,6 +12,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.documents import EVENTS, GAME, GameDocument
 from crgame_ros.game.events import AtStep, FiredEvent, PlannerSwap
 from crgame_ros.game.game import Game, parse_game, PoseSpawn
+from crgame_ros.paths import expanded
 from crgame_ros.recording.epochs import read_epoch, XML_TOPIC
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import replay_inputs
@@ -214,7 +215,7 @@ def with_replayed_events(setup: Setup) -> Setup:
 
 def _bag(setup: Setup, source: SourceSpec) -> Path:
     """Return the recording that a source names, relative to the game file."""
-    return recording_in(setup.game.base / Path(source.argument).expanduser())
+    return recording_in(setup.game.base / expanded(source.argument))
 
 
 class RecordedEvents(NamedTuple):

@@ -5,13 +5,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-import subprocess
 import sys
 import time
 
 from crgame_ros.analysis.counterfactual import Alternative, drive_against, driven_live
 from crgame_ros.errors import CrgameError
 from crgame_ros.launcher.arguments import RunRequest
+from crgame_ros.launcher.interruption import run_to_its_end
 from crgame_ros.launcher.run_plan import effective_setup
 from crgame_ros.recording.recorded_game import inputs_of, RecordedInputs
 from crgame_ros.recording.run_folder import recording_in
@@ -110,11 +110,10 @@ def run_live(game: Path, planner: str, folder: Path, duration_s: float | None = 
     """
     # Checked before any process starts, so that an error is reported in one line.
     effective_setup(RunRequest(game=game, planners=(planner,)))
-    done = subprocess.run([
+    code = run_to_its_end([
         sys.executable, '-m', 'crgame_ros.launcher.main', str(game), '--headless',
         '--planner', planner, '--out', str(folder),
-        *([] if duration_s is None else ['--duration', repr(duration_s)])],
-        stdin=subprocess.DEVNULL)
-    if done.returncode:
-        raise CrgameError(f'the live run of {game.name} ended with {done.returncode}; what it '
+        *([] if duration_s is None else ['--duration', repr(duration_s)])])
+    if code:
+        raise CrgameError(f'the live run of {game.name} ended with {code}; what it '
                           f'said is above, its files are in {folder}; --offline needs no ROS')

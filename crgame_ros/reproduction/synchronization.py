@@ -54,7 +54,6 @@ class NaiveLoop:
             setup.game.timing, pacing=False, frame_skipping=False, drift_reset=False,
             measured_interval=False)
         self._controller = TimeController(spec, self._dt_s)
-        self.metrics = TimingMetrics(self._dt_s)
         self._monitor = drivability_monitor(observed_run(setup))
         self._writer = BagWriter(folder, now_ns=time.monotonic_ns)
         self._channel = self._writer.add_topic('/state', 'std_msgs/msg/String', TopicQos())
@@ -100,7 +99,6 @@ class NaiveLoop:
         data = b'\0\1\0\0' + (len(text) + 1).to_bytes(4, 'little') + text + b'\0'
         self._writer.write(self._channel, data, time.time_ns())
         busy_s = (time.monotonic_ns() - start_ns) * 1e-9
-        self.metrics.add(cycle.ideal_s, cycle.actual_s, busy_s, cycle.dropped_s)
         self._rows.extend((
             0.0, cycle.n, simulation.scheduler.k(simulation.n), cycle.ideal_s, cycle.actual_s,
             cycle.step_error_s, cycle.cumulative_error_s, busy_s, sleep_s, cycle.dt_eff_s,
@@ -109,7 +107,9 @@ class NaiveLoop:
     def close(self) -> TimingSummary:
         """Finish the recording, and return the metrics."""
         self._writer.close()
-        return self.metrics.summary()
+        metrics = TimingMetrics(self._dt_s)
+        metrics.add_rows(self.cycles.timing_rows())
+        return metrics.summary()
 
 
 PROPOSED, NAIVE = 'Proposed', 'Naive'

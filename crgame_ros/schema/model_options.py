@@ -3,9 +3,9 @@
 """The options of exchangeable models, as their constructors and docstrings declare them."""
 
 import inspect
-from typing import get_type_hints, NamedTuple
+from typing import NamedTuple
 
-from crgame_ros.registry import ModelRegistry
+from crgame_ros.registry import hints_of, ModelRegistry
 from crgame_ros.schema.declaration import sentences_of, wanted
 
 
@@ -28,10 +28,11 @@ def options_of(registry: ModelRegistry[object], name: str) -> list[Option]:
     """
     Return the options of a model.
 
-    :raises InputError: if there is no such model, or its package is not installed.
+    :raises InputError: if there is no such model, its package is not installed, or its hints
+        cannot be read.
     """
     kind = registry.find(name)
-    hints, sentences = get_type_hints(kind.__init__), sentences_of(kind)
+    hints, sentences = hints_of(kind, registry.label(name)), sentences_of(kind)
     return [Option(key, wanted(hints.get(key, object)), _written(parameter, registry.left_out),
                    sentences.get(key, ''))
             for key, parameter in inspect.signature(kind).parameters.items()

@@ -306,7 +306,13 @@ class AutonomousVehicle:
         return mapped
 
     def planned_state(self, n: int) -> VehicleState | None:
-        """Return the followed plan's state at step n; None beyond its end or without one."""
+        """
+        Return the followed plan's state at step n; None beyond its end or without one.
+
+        No plan is followed while a person drives, and until there is one requested after that.
+        """
+        if self._driven is not None or self._given_back_n is not None:
+            return None
         return self._tracker.sample(n)
 
     def drive(self, command: DriverCommand, dt_s: float) -> VehicleState:

@@ -9,10 +9,8 @@ from crgame_ros.control.tracker import TRACKERS
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import AvSpec, ModelSpec
 from crgame_ros.game.objects import ObjectDescription, Role
-from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joints import JointSeries, vehicle_to_joints, vehicles_from_joints
-from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.perception.localisation import Localisation
 from crgame_ros.perception.perception import Perception
 from crgame_ros.vehicle.models import VEHICLE_MODELS, VehicleModel
@@ -72,9 +70,8 @@ def check_models(avs: Sequence[tuple[AvSpec, VehicleParameters]],
         if spec.perception is not None:
             me = ObjectDescription(spec.id, vehicle.type, Role.AUTONOMOUS, vehicle.shape,
                                    vehicle.rear_to_center)
-            make_perception(spec.id, spec.perception, [me], vehicle, RigidTransform(),
-                            VehicleState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0,
-                            CHECKING_STEP_S, None)
+            Perception(spec.id, spec.perception, [me], vehicle, RigidTransform(),
+                       VehicleState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0, CHECKING_STEP_S)
     for human_id, dynamics, vehicle in humans:
         make_vehicle_model(dynamics, vehicle, f'{human_id}: dynamics')
 
@@ -87,20 +84,6 @@ def make_localisation(spec: AvSpec, initial: VehicleState, game_seed: int,
         return None
     seed = game_seed if spec.perception.seed is None else spec.perception.seed
     return Localisation(spec.perception.localisation, seed, spec.id, published(initial), dt_s)
-
-
-def make_perception(av_id: str, spec: PerceptionSpec, descriptions: Sequence[ObjectDescription],
-                    vehicle: VehicleParameters, transform: RigidTransform,
-                    initial: VehicleState, game_seed: int, dt_s: float,
-                    occupancy: TiledOccupancy | None) -> Perception:
-    """
-    Make an AV's perception.
-
-    :param descriptions: of everything that can appear: driven vehicles, then objects.
-    :param initial: the AV's state when it begins, as published.
-    """
-    return Perception(av_id, spec, descriptions, vehicle, transform, initial, game_seed, dt_s,
-                      occupancy=occupancy)
 
 
 def published_states(states: Sequence[VehicleState]) -> NDArray[np.float64]:

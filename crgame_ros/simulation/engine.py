@@ -305,8 +305,7 @@ class Simulation:
                       objects: ObjectStates) -> tuple[FiredEvent, ...]:
         """Apply events to objects, agents and planners at a tick."""
         for name in () if self._tasks is None else self._tasks.due_events(self.n):
-            # It may have taken effect before.
-            events.trigger(name)
+            events.announce(name)
         fired = events.at_tick(self.n, k, self.states, objects)
         for action in events.actions(fired):
             if isinstance(action, PlannerRun):

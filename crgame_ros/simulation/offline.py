@@ -19,7 +19,7 @@ from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.manager import FailureLines, planner_status, PlannerManager
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.simulation.autonomous_vehicle import AvCounters
-from crgame_ros.simulation.av_models import make_perception, published_states
+from crgame_ros.simulation.av_models import published_states
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.observer import drivability_monitor, ObservedRun, RunObserver
 from crgame_ros.simulation.plan_requests import request_topic
@@ -162,7 +162,7 @@ class PlannerSeat:
         self.perception: Perception | None = None
         if av.spec.perception is not None:
             initial = published_states([av.state])[0]
-            self.perception = make_perception(
+            self.perception = Perception(
                 av.id, av.spec.perception, setup.descriptions, av.vehicle, av.transform,
                 VehicleState(*initial.tolist()), setup.game.seed, simulation.scheduler.dt_s,
                 setup.open_occupancy())

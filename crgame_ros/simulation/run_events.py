@@ -73,6 +73,10 @@ class RunEvents:
             self._triggered.add(name)
         return reason
 
+    def announce(self, name: str) -> None:
+        """Let an event take effect as soon as it can, unless it has done so already."""
+        self._triggered.add(name)
+
     def actions(self, fired: Sequence[FiredEvent]) -> list[Action]:
         """Return the actions of events, in their order."""
         return [self._actions[event.name] for event in fired]

@@ -111,7 +111,8 @@ class RunTasks:
         self._happened: set[str] = set()
         self._entries: list[TaskEntry] = []
         self._reports: list[TaskReport] = []
-        self._taken = (0, 0)
+        # Of each seat: the second of its last report, and how many came in that second.
+        self._taken: dict[str, tuple[int, int]] = {}
         self._n = 0
 
     def _begins(self, spec: TaskSpec) -> TaskCondition | None:
@@ -157,10 +158,11 @@ class RunTasks:
         if course is None or course.seat != report.seat:
             return f'there is no task "{report.task}" for {report.seat}'
         second = int(self._n * self._setup.scheduler.dt_s)
-        count = self._taken[1] if self._taken[0] == second else 0
+        last, count = self._taken.get(report.seat, (second, 0))
+        count = count if last == second else 0
         if count == REPORTS_PER_S:
             return f'{report.seat}: more than {REPORTS_PER_S} reports in a second'
-        self._taken = (second, count + 1)
+        self._taken[report.seat] = (second, count + 1)
         self._reports.append(report)
         return None
 

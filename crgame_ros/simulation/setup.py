@@ -19,6 +19,7 @@ from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.occupancy.tiles import TiledOccupancy
+from crgame_ros.paths import expanded
 from crgame_ros.registry import POLICY
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.exact_values import exact_position
@@ -240,7 +241,7 @@ def _from_anywhere(driver: str, base: Path) -> str:
     """Return a policy driver with its file's absolute path; other drivers are unchanged."""
     if not driver.startswith(POLICY):
         return driver
-    return POLICY + str((base / Path(driver.removeprefix(POLICY)).expanduser()).resolve())
+    return POLICY + str((base / expanded(driver.removeprefix(POLICY))).resolve())
 
 
 def _scripted(game: Game, network: RoadNetwork,

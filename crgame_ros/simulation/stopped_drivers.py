@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stops driven vehicles at contacts, and puts them back on their lane."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 import math
 from typing import TypeGuard
 
@@ -35,6 +35,7 @@ LEFT_BEHIND = 20.0
 
 FloatArray = NDArray[np.float64]
 Place = tuple[float, float, float]
+_Candidate = tuple[Place, shapely.Polygon]
 
 
 class PutBack:
@@ -51,6 +52,8 @@ class PutBack:
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
         self._stopped: dict[int, VehicleState] = {}
+        # Where each was when none of its places was free, and the places: a driver keeps asking.
+        self._tried: dict[int, tuple[Place, list[_Candidate]]] = {}
         shapes = [vehicle.vehicle.shape for vehicle in setup.vehicles]
         self._shapes = shapes + [item.shape for item in setup.obstacles.descriptions]
 
@@ -77,12 +80,20 @@ class PutBack:
             del self._stopped[index]
             return None
         taken = shapely.STRtree(self._taken(index, since_tick_s, states, objects))
-        for place in self._places(index, now):
-            room = self._room(index, place)
+        tried: list[_Candidate] = []
+        for place, room in self._candidates(index, now):
             if not len(taken.query(room, predicate='dwithin', distance=ROOM_AROUND)):
                 del self._stopped[index]
                 return VehicleState(*place, 0.0)
+            tried.append((place, room))
+        self._tried[index] = now[:3], tried
         return None
+
+    def _candidates(self, index: int, now: VehicleState) -> Iterable[_Candidate]:
+        """Return the places on the lane with the room that each needs, best first."""
+        if index in self._tried and self._tried[index][0] == now[:3]:
+            return self._tried[index][1]
+        return ((place, self._room(index, place)) for place in self._places(index, now))
 
     def _transform(self, index: int) -> RigidTransform:
         """Return the vehicle's transform to the road's coordinates (CRG 28)."""

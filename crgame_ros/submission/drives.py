@@ -19,6 +19,7 @@ from crgame_ros.evaluation.file_names import GRID_FILE
 from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.game.game import AvSpec, DEFAULT_PLANNER, Game
 from crgame_ros.library.lookup import find_scenarios, names_file
+from crgame_ros.paths import expanded
 from crgame_ros.planner.registry import create_planner, EXTERNAL
 from crgame_ros.recording.info import describe
 from crgame_ros.recording.metadata import METADATA_FILE
@@ -95,7 +96,7 @@ def find_drives(names: Sequence[str], choice: DrivingChoice) -> list[Drive]:
     found: list[Drive] = []
     scenarios, evaluations = [], 0
     for name in names:
-        path = Path(name).expanduser()
+        path = expanded(name)
         if names_file(name) and (path / GRID_FILE).exists():
             found += _cells(path, choice)
             evaluations += 1

@@ -7,7 +7,7 @@ The table of the paper contradicts itself, so the definitions are the project's 
 refer to the original anchor t_0: the time dropped by drift resets is added back.
 """
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left
 from dataclasses import dataclass
 from itertools import accumulate
 import math
@@ -39,21 +39,12 @@ class LogHistogram:
 
     _decades = round(math.log10(HIGHEST_S / LOWEST_S))
     _edges = np.geomspace(LOWEST_S, HIGHEST_S, _decades * BINS_PER_DECADE + 1)
-    # A single value is searched in a list: in an array that takes ten times as long.
-    _edge_list: list[float] = _edges.tolist()
 
     def __init__(self) -> None:
         self._counts = [0] * (len(self._edges) + 1)
         self._total = 0
         self._least = math.inf
         self._greatest = -math.inf
-
-    def add(self, value_s: float) -> None:
-        """Count one duration [s]."""
-        self._counts[bisect_right(self._edge_list, value_s)] += 1
-        self._total += 1
-        self._least = min(self._least, value_s)
-        self._greatest = max(self._greatest, value_s)
 
     def add_all(self, values_s: NDArray[np.float64]) -> None:
         """Count many durations (R) [s]."""
@@ -84,7 +75,7 @@ class LogHistogram:
             return self._least
         if index == len(self._edges):
             return self._greatest
-        return math.sqrt(self._edge_list[index - 1] * self._edge_list[index])
+        return math.sqrt(self._edges[index - 1] * self._edges[index])
 
 
 ROW_COLUMNS = ('ideal_s', 'actual_s', 'busy_s', 'dropped_s')
@@ -192,59 +183,13 @@ class TimingMetrics:
         """Return the number of cycles so far."""
         return self._cycles
 
-    def add(self, ideal_s: float, actual_s: float, busy_s: float, dropped_s: float) -> None:
-        """
-        Add one cycle, in O(1).
-
-        :param ideal_s: tau*_n, scheduled start, after all resets so far [s]
-        :param actual_s: tau_n, actual start [s]
-        :param busy_s: computing time of the cycle, without waiting in the executor [s]
-        :param dropped_s: D_n, time by which all resets so far moved the schedule [s]
-        :raises InputError: if a value is no number or time runs backwards.
-        """
-        if not math.isfinite(ideal_s + actual_s + busy_s + dropped_s):
-            raise InputError('a time is no finite number', 'timing cycle', 'drop the row')
-        scheduled = ideal_s - dropped_s
-        if self._cycles:
-            self._add_step(scheduled, actual_s, dropped_s)
-        else:
-            self._first = (scheduled, actual_s)
-            self._add_lag(actual_s - ideal_s)
-        self._cycles += 1
-        self._timeouts += busy_s > self.dt_s
-        self._max_error = max(self._max_error, abs(actual_s - scheduled))
-        self._busy.add(busy_s)
-        self._last = (scheduled, actual_s, dropped_s)
-
-    def _add_step(self, scheduled: float, actual_s: float, dropped_s: float) -> None:
-        last_scheduled, last_actual, last_dropped = self._last
-        interval = actual_s - last_actual
-        if interval < 0.0:
-            raise InputError(f'time runs backwards at {actual_s} s', 'timing cycle',
-                             'begin new metrics at each reset of the simulation')
-        step = scheduled - last_scheduled
-        error = abs(interval - step)
-        self._resets += dropped_s != last_dropped
-        self._add_lag(actual_s - scheduled - last_dropped)
-        self._step_error_sum += error
-        self._step_errors.add(error)
-        if interval > 0.0:
-            self._ratio_min = min(self._ratio_min, step / interval)
-        elapsed = actual_s - self._first[1]
-        if elapsed > 0.0:
-            self._ratio_sum += (scheduled - self._first[0]) / elapsed
-            self._ratio_count += 1
-
-    def _add_lag(self, lag_s: float) -> None:
-        self._worst_lag = max(self._worst_lag, lag_s)
-        self._late += lag_s > self.dt_s
-
     def add_rows(self, rows: NDArray[np.float64]) -> None:
         """
-        Add many cycles at once, with the same result as single calls of `add`.
+        Add cycles; the result is the same however they are divided into calls.
 
         :param rows: (R, 4) columns as in `ROW_COLUMNS` [s], in the order of time.
-        :raises InputError: as `add`, and for an array of another shape.
+        :raises InputError: if the array has another shape, a value is no number or time runs
+            backwards.
         """
         if rows.ndim != 2 or rows.shape[1] != len(ROW_COLUMNS):
             raise InputError(f'timing rows have shape {rows.shape}', 'timing metrics',
@@ -259,7 +204,8 @@ class TimingMetrics:
             before = np.array(self._last)[:, np.newaxis]
         else:
             self._first = (float(scheduled[0]), float(actual[0]))
-            self._add_lag(float(actual[0] - ideal[0]))
+            self._worst_lag = max(0.0, float(actual[0] - ideal[0]))
+            self._late = int(self._worst_lag > self.dt_s)
             before = np.empty((3, 0))
         self._add_steps(np.hstack((before, np.stack((scheduled, actual, dropped)))))
         self._cycles += len(rows)
@@ -329,5 +275,5 @@ class TimingMetrics:
 
 def _running_sum(start: float, values: NDArray[np.float64]) -> float:
     # Summed in order: numpy's own sum groups the values, and its last bits then differ from those
-    # of single additions.
+    # of other blocks.
     return float(np.cumsum(np.concatenate(([start], values)))[-1])

@@ -148,8 +148,8 @@ def lock_memory() -> bool:
     return bool(ctypes.CDLL(None).mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0)
 
 
-# Numbers of sched_setattr and sched_getattr; glibc has no names for them before 2.41.
-_CALLS = {'x86_64': (314, 315), 'aarch64': (274, 275)}
+# Numbers of sched_setattr; glibc has no name for it before 2.41.
+_CALLS = {'x86_64': 314, 'aarch64': 274}
 # struct sched_attr: size, policy, flags, nice, priority, runtime (the slice), deadline, period.
 _ATTRIBUTES = struct.Struct('=IIQiIQQQ')
 SHORTEST_NS = 100_000
@@ -162,20 +162,9 @@ def shorten_time_slice(slice_ns: int = SHORTEST_NS) -> bool:
     :param slice_ns: at least 0.1 ms, the kernel's least [ns]
     :return: whether the kernel accepted the call.
     """
-    numbers = _CALLS.get(platform.machine())
-    if numbers is None or os.sched_getscheduler(0) != os.SCHED_OTHER:
+    number = _CALLS.get(platform.machine())
+    if number is None or os.sched_getscheduler(0) != os.SCHED_OTHER:
         return False
     attributes = _ATTRIBUTES.pack(_ATTRIBUTES.size, os.SCHED_OTHER, 0,
                                   os.getpriority(os.PRIO_PROCESS, 0), 0, slice_ns, 0, 0)
-    return bool(ctypes.CDLL(None).syscall(numbers[0], 0, ctypes.c_char_p(attributes), 0) == 0)
-
-
-def time_slice_ns() -> int | None:
-    """Read this thread's slice [ns]; None where the kernel has none for ordinary tasks."""
-    numbers = _CALLS.get(platform.machine())
-    if numbers is None:
-        return None
-    buffer = ctypes.create_string_buffer(_ATTRIBUTES.size)
-    if ctypes.CDLL(None).syscall(numbers[1], 0, buffer, _ATTRIBUTES.size, 0) != 0:
-        return None
-    return int(_ATTRIBUTES.unpack(buffer.raw)[5]) or None
+    return bool(ctypes.CDLL(None).syscall(number, 0, ctypes.c_char_p(attributes), 0) == 0)

@@ -58,7 +58,8 @@ class DynamicBicycle(VehicleModel):
                 return VehicleState(state.x, state.y, state.yaw, 0.0, angle, 0.0, 0.0, rate)
             start = direction * max(0.0, direction * start)
         moving_s, end_speed, end = dt_s, *self._speed(speed, start, commanded, dt_s)
-        limit = self.speed_limit(direction)
+        # Above its greatest speed the car may roll on, but not accelerate.
+        limit = max(self.speed_limit(direction), direction * speed)
         if direction * end_speed > limit:
             end_speed, end = direction * limit, 0.0
         elif direction * end_speed < 0.0:

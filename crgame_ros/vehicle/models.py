@@ -102,7 +102,8 @@ class KinematicSingleTrack(VehicleModel):
         end = along + along_acceleration * dt_s
         if end <= 0.0 and along_acceleration < 0.0:
             return min(dt_s, along / -along_acceleration), acceleration
-        limit = self.speed_limit(direction)
+        # Above its greatest speed the car may roll on, but not accelerate.
+        limit = max(self.speed_limit(direction), along)
         if end > limit:
             return dt_s, direction * (limit - along) / dt_s
         return dt_s, acceleration

@@ -10,7 +10,6 @@ from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec
 from crgame_ros.messages.joints import JointSeries, object_joint_names, vehicle_joint_names
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.perception.perception import Perception
-from crgame_ros.simulation.av_models import make_perception
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import VehicleState
@@ -51,9 +50,9 @@ def run_perceiving(duration_s: float) -> tuple[Perceived, list[Message]]:
                 avs=(AvSpec('av0', 'constant-velocity', perception=spec),))
     result = run_offline(build_setup(game), duration_s=duration_s, check_drivability=False)
     setup, av = result.setup, result.setup.avs[0]
-    perception = make_perception(
+    perception = Perception(
         'av0', spec, setup.descriptions, av.vehicle, av.transform,
-        VehicleState(*result.vehicle_states[0, 1]), 0, setup.scheduler.dt_s, None)
+        VehicleState(*result.vehicle_states[0, 1]), 0, setup.scheduler.dt_s)
     found = Perceived(result, np.empty((len(result.vehicle_states), 3)),
                       np.empty((len(result.vehicle_states), 2, 2)), {}, [])
     messages: list[Message] = [('/occupancy', GRID, START, _grid())]

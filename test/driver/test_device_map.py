@@ -9,7 +9,6 @@ from crgame_ros.driver.device_map import (
     DeviceMap,
     load_device_map,
     load_device_maps,
-    parse_device_map,
 )
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import joy_state, normalize, RawInput
@@ -116,9 +115,9 @@ def test_keyboard_has_the_papers_keys() -> None:
     keys = load_device_map('keyboard').keys
     assert keys is not None
     e = ecodes
-    assert (keys.throttle, keys.brake) == ({e.KEY_W, e.KEY_UP},
-                                           {e.KEY_S, e.KEY_DOWN, e.KEY_SPACE})
-    assert (keys.left, keys.right) == ({e.KEY_A, e.KEY_LEFT}, {e.KEY_D, e.KEY_RIGHT})
+    assert [set(each) for each in (keys.throttle, keys.brake, keys.left, keys.right)] == [
+        {e.KEY_W, e.KEY_UP}, {e.KEY_S, e.KEY_DOWN, e.KEY_SPACE}, {e.KEY_A, e.KEY_LEFT},
+        {e.KEY_D, e.KEY_RIGHT}]
     assert keys.held({e.KEY_SPACE, e.KEY_LEFT}, True)[:5] == (False, True, True, False, True)
     assert keys.held({e.KEY_UP, e.KEY_D}, False, Light.RIGHT | Light.HORN) == (
         True, False, False, True, False, False, True, True, False)
@@ -135,9 +134,16 @@ buttons: {reverse_toggle: [{evdev: BTN_A, joy: 2}]}
 """
 
 
-def test_combined_pedals_are_read() -> None:
+def parse_device_map(text: str, folder: Path) -> DeviceMap:
+    """Read a map from a file old.yaml."""
+    path = folder / 'old.yaml'
+    path.write_text(text, encoding='utf-8')
+    return load_device_map(str(path))
+
+
+def test_combined_pedals_are_read(tmp_path: Path) -> None:
     """One axis serves both pedals, with the device's ranges."""
-    device = parse_device_map(COMBINED, 'maps/old.yaml')
+    device = parse_device_map(COMBINED, tmp_path)
     assert (device.name, device.kind) == ('old', DeviceKind.WHEEL)
     assert device.evdev is not None
     layout = device.evdev.layout({ecodes.ABS_WHEEL: (0, 100), ecodes.ABS_GAS: (-50, 50)})
@@ -167,12 +173,13 @@ def test_combined_pedals_are_read() -> None:
     ('title: Old wheel', 'title: &a [*a]', 'alias'),
     ('title: Old wheel', 'title: [', 'is no YAML'),
 ])
-def test_wrong_maps_name_file_and_key(old: str, new: str, key: str) -> None:
+def test_wrong_maps_name_file_and_key(
+        old: str, new: str, key: str, tmp_path: Path) -> None:
     """Each message names the file, the key and the value."""
     assert old in COMBINED
     with pytest.raises(InputError, match=key) as caught:
-        parse_device_map(COMBINED.replace(old, new), 'maps/old.yaml')
-    assert str(caught.value).startswith('maps/old.yaml')
+        parse_device_map(COMBINED.replace(old, new), tmp_path)
+    assert str(caught.value).startswith(f'{tmp_path}/old.yaml')
 
 
 def test_a_missing_map_lists_the_known_ones(tmp_path: Path) -> None:
@@ -191,11 +198,11 @@ def test_maps_of_another_directory(tmp_path: Path) -> None:
     assert [m.title for m in maps] == ['Old wheel']
 
 
-def test_the_documented_example_is_the_g29() -> None:
+def test_the_documented_example_is_the_g29(tmp_path: Path) -> None:
     """The example of docs/driving.md is valid and drives like a G29 without a shifter."""
     text = (Path(__file__).parents[2] / 'docs' / 'driving.md').read_text(encoding='utf-8')
     block = next(b for b in text.split('```yaml')[1:] if b.startswith('\ntitle:'))
-    device = parse_device_map(block.split('```')[0], 'driving.yaml')
+    device = parse_device_map(block.split('```')[0], tmp_path)
     g29 = load_device_map('logitech_g29')
     assert device.evdev is not None and g29.evdev is not None
     assert device.evdev.layout(WHEEL_LIMITS).ranges == g29.evdev.layout(WHEEL_LIMITS).ranges

@@ -18,8 +18,8 @@ import time
 
 from crgame_ros.driver.device_map import (
     ForceLimits,
+    load_device_map,
     load_device_maps,
-    parse_device_map,
     TorqueLimiter,
 )
 from crgame_ros.driver.evdev_device import open_evdev
@@ -184,15 +184,17 @@ def test_a_killed_process_leaves_no_force() -> None:
     assert length == LENGTH_MS, 'and one that is stopped pushes no longer than this'
 
 
-def test_maps_say_what_their_motor_holds() -> None:
+def test_maps_say_what_their_motor_holds(tmp_path: Path) -> None:
     """Only maps of shipped wheels have a motor; values out of bounds are refused."""
     for device_map in load_device_maps():
         assert (device_map.force is not None) == (device_map.kind.name == 'WHEEL')
     text = (ROOT / 'config/devices/logitech_g29.yaml').read_text()
+    path = tmp_path / 'm.yaml'
     for wrong in ('max_torque: 0', 'max_torque: 2.1, cap: 1.5', 'max_torque: 2.1, slew: 0',
                   'strength: 1.0'):
+        path.write_text(text.replace('max_torque: 2.1', wrong), encoding='utf-8')
         with pytest.raises(InputError, match='force_feedback'):
-            parse_device_map(text.replace('max_torque: 2.1', wrong), 'm.yaml')
+            load_device_map(str(path))
 
 
 class VirtualMotor:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Driver sources: their names, scripted drivers in lockstep, and an external joy node."""
 
+import math
 from pathlib import Path
 
 from crgame_ros.driver.device_map import load_device_map
@@ -11,11 +12,13 @@ from crgame_ros.driver.source import (
     JoyDriver,
     load_timeline,
     parse_source,
+    ReplayDriver,
     ScriptedDriver,
     SourceSpec,
 )
 from crgame_ros.errors import InputError
-from crgame_ros.vehicle.driver_command import RELEASED
+from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+import numpy as np
 import pytest
 
 DT_S = 0.01
@@ -49,6 +52,18 @@ def test_other_sources_are_refused_with_the_forms(text: str) -> None:
     with pytest.raises(InputError, match='auto, cockpit, idle, evdev or evdev:NAME, '
                                          'keys:FILE, joy or joy:FILE, replay:BAG'):
         parse_source(text)
+
+
+def test_a_recorded_value_that_is_no_switch_is_off() -> None:
+    """A recording may hold any number."""
+    for lights in (math.inf, math.nan, 1e300):
+        driver = ReplayDriver(np.array([[0.5, 0.0, 0.0, 0.0, lights, 1.0]]))
+        assert driver.command(0, 0.01) == DriverCommand(throttle=0.5, put_back=True)
+
+
+def test_nobodys_home_is_a_line_of_its_own() -> None:
+    with pytest.raises(InputError, match='~nobody_here/k.yaml: is in the home folder of nobody'):
+        load_timeline(parse_source('keys:~nobody_here/k.yaml'), Path())
 
 
 def test_timelines_are_found_beside_the_game(tmp_path: Path) -> None:

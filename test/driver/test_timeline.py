@@ -25,6 +25,7 @@ keys:
   - {from: 2.0, to: 2.4, hold: left}
   - {from: 2.2, to: 2.6, hold: [left, right]}
   - {from: 6, to: 8, hold: [throttle, reverse]}
+  - {from: 8, to: 9, hold: put_back}
 """
 JOY = """
 joy:
@@ -35,6 +36,8 @@ joy:
     - [3.5, 0.0, 1.0, 0.0]
   reverse:
     - {from: 2.0, to: 2.5}
+  put_back:
+    - {from: 3.0, to: 3.25}
 """
 
 
@@ -55,7 +58,7 @@ def joy(text: str = JOY) -> JoyTimeline:
 @pytest.mark.parametrize(('t_s', 'held'), [
     (0.0, {'throttle'}), (1.999999, {'throttle'}), (2.0, {'throttle', 'left'}),
     (2.2, {'throttle', 'left', 'right'}), (2.4, {'throttle', 'left', 'right'}),
-    (2.6, {'throttle'}), (3.0, set()), (7.0, {'throttle', 'reverse'}), (8.0, set()),
+    (2.6, {'throttle'}), (3.0, set()), (7.0, {'throttle', 'reverse'}), (8.0, {'put_back'}),
     (1e9, set()), (-1.0, set())])
 def test_keys_are_held_from_start_until_just_before_the_end(t_s: float, held: set[str]) -> None:
     """Intervals are half-open and add up where they overlap."""
@@ -98,7 +101,7 @@ def test_reverse_lasts_for_its_intervals() -> None:
 
 def test_ends() -> None:
     """A timeline has an end, so a run can be as long as its script."""
-    assert (keys().end_s, joy().end_s) == (8.0, 3.5)
+    assert (keys().end_s, joy().end_s) == (9.0, 3.5)
 
 
 @pytest.mark.parametrize('text', [
@@ -109,6 +112,7 @@ def test_text_round_trip(text: str) -> None:
     timeline = parse_timeline(text, 'here')
     carried = json.loads(json.dumps(timeline_text(timeline)))
     assert parse_timeline(carried, 'there') == timeline
+    assert timeline_text(parse_timeline(carried, 'there')) == carried
 
 
 def test_json_is_read() -> None:

@@ -105,10 +105,17 @@ def test_games_of_the_package_have_names_and_scenarios_need_no_option(tmp_path: 
     assert parse_arguments(['cut_in']).game == default_game()
     request = parse_arguments(['road.xml'])
     assert (request.game, request.scenario) == (None, Path('road.xml'))
-    # A file or folder of that name goes first; anything else that is named like a file is one.
+    # A file of that name goes first; anything else that is named like a file is one.
     assert parse_arguments(['games/mine.yaml']).game == Path('games/mine.yaml')
     with pytest.raises(InputError, match='neither a file nor one of the games .*cut_in, '):
         parse_arguments(['nothing_like_it'])
+
+
+def test_a_folder_does_not_hide_a_game(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'cut_in').mkdir()
+    assert parse_arguments(['cut_in']).game == default_game()
 
 
 def test_options_of_planners_are_written_as_in_a_game() -> None:

@@ -13,7 +13,6 @@ from crgame_ros.perception.perception import Perception
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.ros.messages import from_time
-from crgame_ros.simulation.av_models import make_perception
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.simulation.traffic_setup import WorldReader
 from crgame_ros.vehicle.state import VehicleState
@@ -103,9 +102,9 @@ def test_perception_perceives_the_same_in_its_process(recorded: Recorded) -> Non
     for n in range(int(DURATION_S * 100)):
         states = vehicles_from_joints(*recorded.joints(n))
         if perception is None:
-            perception = make_perception(
+            perception = Perception(
                 'av0', av.spec.perception, setup.descriptions, av.vehicle, av.transform,
-                VehicleState(*states[len(setup.humans)].tolist()), setup.game.seed, 0.01, None)
+                VehicleState(*states[len(setup.humans)].tolist()), setup.game.seed, 0.01)
         if n % STEPS_PER_TICK == 0:
             objects = recorded.objects('/traffic/objects', n)
         perception.observe(n, states, objects.poses, objects.velocities,

@@ -154,8 +154,8 @@ def test_criticality_begins_within_a_second(finished: Launcher) -> None:
 
 @pytest.mark.exhaustive
 def test_the_human_drives_live_against_another_planner(finished: Launcher, tmp_path: Path) -> None:
-    """In real time, with a recording; the human repeats its motion to the last bit."""
-    assert main(['replay', str(finished.out), '--planner', 'constant-velocity', '--live',
+    """In real time, once; the human repeats its motion to the last bit."""
+    assert main(['replay', str(finished.out), *2 * ['--planner', 'constant-velocity'], '--live',
                  '--headless', '--out', str(tmp_path / 'out')]) == 0
     recorded, found = json.loads((tmp_path / 'out' / 'comparison.json').read_text())
     assert found['human_differs_s'] is None

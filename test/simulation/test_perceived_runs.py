@@ -8,7 +8,8 @@ from typing import Any
 from crgame_ros.game.game import parse_game
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.simulation.av_models import ego_of, make_perception, published_states
+from crgame_ros.perception.perception import Perception
+from crgame_ros.simulation.av_models import ego_of, published_states
 from crgame_ros.simulation.engine import Simulation
 from crgame_ros.simulation.offline import OfflineResult, PlannerSeat, run_offline
 from crgame_ros.simulation.setup import build_setup, Setup
@@ -106,9 +107,9 @@ def perceived(setup: Setup) -> tuple[Simulation, JointSeries, JointSeries]:
     av = setup.avs[0]
     assert av.spec.perception is not None
     states = published_states(simulation.states)
-    perception = make_perception(
+    perception = Perception(
         av.id, av.spec.perception, setup.descriptions, av.vehicle, av.transform,
-        VehicleState(*states[len(setup.humans)].tolist()), setup.game.seed, 0.01, None)
+        VehicleState(*states[len(setup.humans)].tolist()), setup.game.seed, 0.01)
     perception.observe(0, states, simulation.objects.poses, simulation.objects.velocities)
     true = result.requests[av.id]
     return simulation, true, perception.perceive(true)

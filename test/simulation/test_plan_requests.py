@@ -74,6 +74,13 @@ def test_plans_mode_tells_the_other_avs_plan(two_avs: LoadedScenario) -> None:
     np.testing.assert_allclose(speed[15:], run.simulation.avs[0].state.speed)
     # The request has no plan of the AV's own.
     assert np.isnan(columns_of(request, 'av1', request.positions)[1:]).all()
+    # A person drives the AV, then gives it back: it follows no plan before there is a new one.
+    run.drive(10, commands=lambda n: [DriverCommand(throttle=0.5)], acceleration=1.5)
+    speed = np.hypot(*columns_of(run.result.requests['av1'], 'av0',
+                                 run.result.requests['av1'].velocities)[:, :2].T)
+    np.testing.assert_allclose(speed, run.simulation.avs[0].state.speed)
+    run.drive(1, plans=False)
+    assert run.simulation.avs[0].planned_state(run.simulation.n + 10) is None
 
 
 def braking_later(loaded: LoadedScenario, k: int) -> LoadedScenario:

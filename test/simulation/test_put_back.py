@@ -133,6 +133,18 @@ def test_a_place_is_passed_over_where_another_vehicle_comes(cut_in: LoadedScenar
         assert (places.place(0, 0.0, states, nobody) == free) is is_free
 
 
+def test_places_that_were_taken_are_asked_for_again(cut_in: LoadedScenario) -> None:
+    """While a car at 60 m/s covers the lane there is none, after that the same as at once."""
+    run = crashed(setup_of(cut_in))
+    stopped, other, av = run.simulation.states
+    places, objects = PutBack(run.simulation.setup), run.simulation.objects
+    places.note(0, stopped)
+    fast = VehicleState(stopped.x - 60.0, 0.0, 0.0, 60.0)
+    for _ in range(2):
+        assert places.place(0, 0.0, [stopped, fast, av], objects) is None
+    assert places.place(0, 0.0, [stopped, other, av], objects) == put_back(run)
+
+
 def test_in_the_oncoming_lane_it_is_put_on_its_own() -> None:
     loaded = load_scenario(load_game(
         scenarios_directory() / 'occluded_pedestrian.yaml').scenario)

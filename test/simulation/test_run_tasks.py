@@ -161,7 +161,7 @@ def test_answers_by_their_times(street: LoadedScenario) -> None:
 
 def test_reports_of_others_and_floods_are_refused(street: LoadedScenario) -> None:
     """From another seat, of another task, and more than a person can give in a second."""
-    course = Course(setup_of(street, LIGHT))
+    course = Course(setup_of(street, LIGHT, {**LIGHT, 'name': 'other', 'seat': 'av0'}))
     for seat, task in (('av0', 'light'), ('hv0', 'none')):
         reason = course.simulation.report_task(TaskReport(seat, task, 1, 'answer'))
         assert reason is not None and seat in reason
@@ -171,6 +171,7 @@ def test_reports_of_others_and_floods_are_refused(street: LoadedScenario) -> Non
     course.to(2)
     # At most one a step is kept.
     assert [what for what, _, _ in course.told()].count('unrequested') == 1
+    assert course.simulation.report_task(TaskReport('av0', 'other', 0, 'answer')) is None
     assert 'no tasks' in str(Course(setup_of(street)).simulation.report_task(
         TaskReport('hv0', 'light', 1, 'answer')))
 
@@ -195,6 +196,15 @@ def test_a_request_triggers_an_event_without_a_time_its_lead_later(
     assert [(entry.what, entry.n) for entry in course.entries] == [('request', 100), ('over', 400)]
     assert [(event.name, event.n, event.by) for event in course.simulation.fired] == [
         ('slow', 300, 'trigger')]
+
+
+def test_a_request_announces_an_event_that_waits_for_its_object(street: LoadedScenario) -> None:
+    """Due at 3 s, when the pedestrian still stands; it brakes at the first tick it walks."""
+    walk = {'name': 'walk', 'release': {'object': 201}, 'when': {'time': 4.0}}
+    halt = {'name': 'slow', 'brake': {'object': 201}}
+    course = Course(setup_of(street, {**CALL, 'when': {'time': 1.0}}, events=(walk, halt))).to(450)
+    assert [(event.name, event.n, event.by) for event in course.simulation.fired] == [
+        ('walk', 400, 'condition'), ('slow', 410, 'trigger')]
 
 
 def test_a_request_ends_when_a_person_drives_the_av(street: LoadedScenario) -> None:

@@ -90,8 +90,9 @@ def test_stall_is_caught_up() -> None:
 def test_catch_up_steps_are_counted() -> None:
     """A cycle counts as catching up while the lag exceeds one step: 50, 41, 32, 23 and 14 ms."""
     metrics = TimingMetrics(DT)
-    for cycle in busy_loop(TimeController(SPEC, DT), lambda n: 60 * MS if n == 100 else MS, 200):
-        metrics.add(cycle.ideal_s, cycle.actual_s, 0.001, cycle.dropped_s)
+    cycles = busy_loop(TimeController(SPEC, DT), lambda n: 60 * MS if n == 100 else MS, 200)
+    metrics.add_rows(np.array([[cycle.ideal_s, cycle.actual_s, 0.001, cycle.dropped_s]
+                               for cycle in cycles]))
     assert metrics.summary().catch_up_steps == 5
 
 
@@ -213,8 +214,8 @@ def test_late_steps_in_a_row_are_no_reason_for_a_reset() -> None:
     cycles = busy_loop(controller, lambda n: 10_700_000, 2000)
     assert cycles[-1].cumulative_error_s == pytest.approx(1.4)
     metrics = TimingMetrics(DT)
-    for cycle in cycles:
-        metrics.add(cycle.ideal_s, cycle.actual_s, 0.0107, cycle.dropped_s)
+    metrics.add_rows(np.array([[cycle.ideal_s, cycle.actual_s, 0.0107, cycle.dropped_s]
+                               for cycle in cycles]))
     # The lag exceeds one step from the 15th cycle on.
     assert metrics.summary().catch_up_steps == 1986
 

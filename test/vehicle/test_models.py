@@ -84,6 +84,18 @@ def test_speed_reaches_its_limit_and_stays(name: str, start: float, command: flo
 
 
 @pytest.mark.parametrize('name', MODELS)
+@pytest.mark.parametrize('speed', [60.0, -20.0])
+def test_above_its_limit_a_car_rolls_on_and_brakes_as_any(name: str, speed: float) -> None:
+    """A game may begin so; the speed does not jump to the limit."""
+    model = made(name)
+    state = model.step(at(speed), 0.0, math.copysign(9.0, speed), DT)
+    assert (state.speed, state.acceleration) == (speed, 0.0)
+    for _ in range(100):
+        state = model.step(state, 0.0, -math.copysign(4.0, speed), DT)
+    assert 2.5 < abs(speed) - abs(state.speed) < 4.001
+
+
+@pytest.mark.parametrize('name', MODELS)
 @pytest.mark.parametrize('seed', range(3))
 def test_limits_hold_under_any_command(name: str, seed: int) -> None:
     """Commands far outside: angle 0.91 rad, rate 0.4 rad/s, 11.5 m/s^2; no change of direction."""
