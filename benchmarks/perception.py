@@ -52,7 +52,7 @@ class Scene:
     def scans(self, count: int, grid: OccupancyGrid | None = None) -> Callable[[int], None]:
         """Return the work of a number of sensors that scan at once."""
         bodies = SensedBodies(self.objects)
-        bodies.place(self.poses)
+        bodies.poses = self.poses
         sensors = [create_sensor(spec) for spec in self.sensors[:count]]
 
         def work(_: int) -> None:

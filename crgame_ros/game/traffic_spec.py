@@ -24,9 +24,10 @@ class TrafficSpec:
 
     :param recorded: `reactive` turns recorded vehicles that drive on lanes into agents.
     :param agents: number placed on the road at the start.
-    :param flow: arrivals at each lane that begins at the edge of the map [vehicles/h]
+    :param flow: arrivals at each lane of more than 10 m that begins at the edge of the map
+        [vehicles/h]
     :param capacity: maximum number of agents at a time besides the recorded ones; None derives it
-        from `agents` and `flow`, at most 300.
+        from `agents` and `flow`: at most 300, or `agents` if that is more.
     :param model: car following: acc (FS 3), idm, or a class of your own.
     :param options: of the car-following model.
     :param lane_changes: whether agents change lanes (FS 4).

@@ -95,7 +95,8 @@ class PerceptionNode(Node):
         if self._perception is None:
             if place is None:
                 return
-            self._perception = self._made(scenario, VehicleState(*states[place].tolist()))
+            self._perception = self._made(
+                scenario, VehicleState(*states[place].tolist()), step.n)
             if self._perception is None:
                 return
         begin_s = time.perf_counter()
@@ -120,8 +121,8 @@ class PerceptionNode(Node):
         self._report.publish(f'{seen} known', {
             'known': seen, 'position_sigma': f'{sigma:.3f}', 'n': self._n}, stamp_ns)
 
-    def _made(self, scenario: ScenarioSet, initial: VehicleState) -> Perception | None:
-        """Build the perception of a new run from the AV's present pose; None if it has none."""
+    def _made(self, scenario: ScenarioSet, initial: VehicleState, n: int) -> Perception | None:
+        """Build the AV's perception from its state at step n; None if the game gives it none."""
         game = scenario.game
         av = game.av(self._vehicle_id)
         if av is None or av.perception is None:
@@ -132,7 +133,7 @@ class PerceptionNode(Node):
         perception = Perception(
             self._vehicle_id, spec, scenario.objects, av.vehicle, av.transform, initial, game.seed,
             game.scheduler.dt_s,
-            None if game.occupancy is None else TiledOccupancy(game.occupancy))
+            None if game.occupancy is None else TiledOccupancy(game.occupancy), n)
         gc.collect()
         gc.freeze()
         gc.disable()

@@ -173,6 +173,7 @@ class TrafficNode(Node):
         """Build the agents of a new run, or continue with those published before."""
         assert self._scenario is not None and self._spec is not None
         game, traffic = self._scenario.game, self._traffic
+        is_new = traffic is None
         if traffic is None:
             traffic = make_traffic(
                 self._spec, self._scenario.loaded, self._network, self._reader.others,
@@ -188,7 +189,7 @@ class TrafficNode(Node):
         if k != game.scheduler.k0:
             self.get_logger().warning(f'going on at k = {k}')
             traffic.resume(k, ObjectStates(step.objects.poses[self._columns],
-                                           step.objects.velocities[self._columns]))
+                                           step.objects.velocities[self._columns]), is_new)
         return traffic
 
 

@@ -50,3 +50,6 @@ class OccupancyMap(Protocol):
         :param reach_m: distance around the points [m]
         :return: None if nothing is occupied there.
         """
+
+    def fits_anywhere(self, reach_m: float) -> bool:
+        """Return whether memory holds the surroundings of any one point."""

@@ -73,6 +73,12 @@ class TiledOccupancy:
         tiles = self._range(points, reach_m)
         return tiles is None or _count(tiles) <= self.max_tiles
 
+    def fits_anywhere(self, reach_m: float) -> bool:
+        """Return whether the grid of `near` for any one point is small enough for memory."""
+        across = int(2.0 * reach_m / self._size) + 2
+        return min(self._source.rows, across) * min(self._source.columns, across) \
+            <= self.max_tiles
+
     def near(self, points: NDArray[np.float64], reach_m: float) -> OccupancyGrid | None:
         """
         Return the tiles around points as one rectangular grid.

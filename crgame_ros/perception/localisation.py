@@ -34,7 +34,7 @@ class Localisation:
     """
     The estimated state of an AV, in simulation coordinates.
 
-    It begins with the measurement of step 0. Steering angle, acceleration, yaw rate and steering
+    It begins with the measurement of step n. Steering angle, acceleration, yaw rate and steering
     rate of the estimate are the true ones, from the vehicle's own sensors, because they do not
     depend on localisation. Steps may be left out; the inertial unit then measures the change since
     the last one.
@@ -42,20 +42,21 @@ class Localisation:
     :param spec: noise, bias and rates
     :param seed: of the noise
     :param name: of the vehicle, so that its noise is independent
-    :param initial: true state at step 0
+    :param initial: true state at step n
     :param dt_s: simulation step [s]
+    :param n: step at which it begins
     """
 
     def __init__(self, spec: LocalisationSpec, seed: int, name: str, initial: VehicleState,
-                 dt_s: float) -> None:
+                 dt_s: float, n: int = 0) -> None:
         self._spec = spec
         self._dt_s = dt_s
         self._noise = KeyedNoise(seed, f'{name}/localisation', _WIDTH)
         self._period = max(1, round(1.0 / (spec.rate * dt_s)))
         self._lost_probability = min(1.0, spec.dropout_rate * dt_s)
         self._lost_steps = round(spec.dropout_duration / dt_s)
-        self._lost_until = 0
-        self._n = 0
+        self._lost_until = n
+        self._n = n
         self._truth = initial
         # The bias walks along the axes that the vehicle had at first: those of later steps are not
         # known of steps that are left out.
@@ -63,7 +64,7 @@ class Localisation:
         self._first_yaw = initial.yaw
         deviations = self._deviations(initial)
         self._covariance: Array = np.diag(np.square(deviations))
-        self._state: Array = self._measurement(0, initial, deviations)
+        self._state: Array = self._measurement(n, initial, deviations)
         self._jacobian: Array = np.eye(STATES)
         self._input: Array = np.zeros((STATES, 2))
         self._input[2, 0] = self._input[3, 1] = 1.0

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The perception of an AV: it turns the engine's true request into a perceived one (FS II-B)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 import math
 from typing import NamedTuple
 
+from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec
 from crgame_ros.geometry.angles import wrap_pi_array
@@ -104,8 +105,6 @@ def _rotated(velocities: Array, turn: Array) -> Array:
     return np.stack((cos * x - sin * y, sin * x + cos * y), axis=-1)
 
 
-GridSource = Callable[[Array, float], OccupancyGrid | None]
-
 # Their heading says little about their direction of motion.
 FREE_MOVERS = ('pedestrian', 'unknown')
 
@@ -134,17 +133,19 @@ class Perception:
     :param descriptions: driven vehicles in their order, then objects
     :param vehicle: parameters of the AV
     :param transform: from simulation to the AV's scenario coordinates (CRG 6-8)
-    :param initial: true state of the AV at n = 0
+    :param initial: true state of the AV at step n
     :param seed: the game's, for a specification without a seed of its own
     :param dt_s: simulation step [s]
-    :param occupancy: permanent obstacles, or a function of points (N, 2) and a reach [m]
-    :raises InputError: if a sensor cannot be created.
+    :param occupancy: permanent obstacles
+    :param n: simulation step at which it begins
+    :raises InputError: if a sensor cannot be created, or sees too far for the map of permanent
+        obstacles.
     """
 
     def __init__(self, av_id: str, spec: PerceptionSpec,
                  descriptions: Sequence[ObjectDescription], vehicle: VehicleParameters,
                  transform: RigidTransform, initial: VehicleState, seed: int, dt_s: float,
-                 occupancy: OccupancyMap | GridSource | None = None) -> None:
+                 occupancy: OccupancyMap | None = None, n: int = 0) -> None:
         self.av_id = av_id
         self.spec = spec
         seed = seed if spec.seed is None else spec.seed
@@ -156,18 +157,23 @@ class Perception:
         self._transform = transform
         self._dt_s = dt_s
         self._memory = round(spec.memory / dt_s)
-        self._near: GridSource | None = (
-            occupancy if occupancy is None or callable(occupancy) else occupancy.near)
+        self._occupancy = occupancy
         self._localisation = None if spec.localisation is None else Localisation(
-            spec.localisation, seed, av_id, initial, dt_s)
+            spec.localisation, seed, av_id, initial, dt_s, n)
         self._sensors = [MountedSensor(sensor, vehicle, len(self._ids), seed, av_id, dt_s)
                          for sensor in spec.sensors]
+        for sensor in spec.sensors:
+            if occupancy is not None and not occupancy.fits_anywhere(sensor.horizon):
+                raise InputError(
+                    f'sees {sensor.horizon:g} m far: so much of the occupancy map is too large '
+                    'for memory', f'sensor {sensor.name} of {av_id}',
+                    'give it a smaller horizon, or the map a coarser resolution')
         self._bodies = SensedBodies(descriptions)
         free = np.array([d.type in FREE_MOVERS for d in descriptions], dtype=bool)
         self._tracks = Tracks(~(free | self._static), dt_s)
         self._pending: list[_View] = []
         self._scans: dict[str, tuple[SensorSpec, int, Scan]] = {}
-        self._n = 0
+        self._n = n
         self._truth = initial
         self._present = np.ones(len(self._ids), dtype=bool)
         # From the requests' joint names: the indices of the things, and their columns.
@@ -263,7 +269,7 @@ class Perception:
         centers = np.concatenate((shifted(vehicle_states[:, :3], self._to_center), object_poses))
         # A sensor does not see the vehicle that carries it.
         centers[self._own] = np.nan
-        self._bodies.place(centers)
+        self._bodies.poses = centers
         for sensor in firing:
             scan, found = sensor.scan(n, self._truth, self._bodies, self._grid(sensor))
             self._scans[sensor.spec.name] = (sensor.spec, n, scan)
@@ -273,10 +279,10 @@ class Perception:
                 *self._placed(poses[found.things], velocities[found.things], found)))
 
     def _grid(self, sensor: MountedSensor) -> OccupancyGrid | None:
-        if self._near is None:
+        if self._occupancy is None:
             return None
         x, y, _ = sensor.pose(self._truth)
-        return self._near(np.array([[x, y]]), sensor.spec.horizon)
+        return self._occupancy.near(np.array([[x, y]]), sensor.spec.horizon)
 
     def _placed(self, poses: Array, velocities: Array, found: Detections) -> tuple[Array, Array]:
         """Place a sensor's detections (D, 3) in the map, by the estimated pose and with noise."""

@@ -66,6 +66,8 @@ class SensedBodies:
     The bodies of everything that can appear: rectangles and polygons as edges, circles as discs.
 
     :param descriptions: of all things; their order numbers the bodies
+
+    Attribute `poses`: (M, 3) their centres x, y [m] and yaw [rad] at present; NaN where absent.
     """
 
     def __init__(self, descriptions: Sequence[ObjectDescription]) -> None:
@@ -84,34 +86,21 @@ class SensedBodies:
         self._next: Index = np.arange(1, len(self._local) + 1, dtype=np.intp)
         if counts:
             self._next[starts + counts - 1] = starts
-        self._poses: Array = np.full((self.count, 3), np.nan)
-
-    def place(self, poses: Array) -> None:
-        """
-        Set the poses of the bodies.
-
-        :param poses: (M, 3) centre x, y [m] and yaw [rad]; NaN where absent
-        """
-        self._poses = poses
-
-    @property
-    def poses(self) -> Array:
-        """Return the (M, 3) centre poses last given to `place`."""
-        return self._poses
+        self.poses: Array = np.full((self.count, 3), np.nan)
 
     def near(self, x: float, y: float, reach: float) -> tuple[Edges, Discs]:
         """Return the outlines of bodies that may be within `reach` of a point [m]."""
-        distance = np.hypot(self._poses[:, 0] - x, self._poses[:, 1] - y)
+        distance = np.hypot(self.poses[:, 0] - x, self.poses[:, 1] - y)
         # False where absent, by comparison with NaN.
         close = distance <= self.radii + reach
         discs = self._discs[close[self._discs]]
         kept = np.flatnonzero(close[self._body])
         body = self._body[kept]
-        corners = placed(self._local[kept, None], self._poses[body])[:, 0]
+        corners = placed(self._local[kept, None], self.poses[body])[:, 0]
         place = np.empty(len(self._local), dtype=np.intp)
         place[kept] = np.arange(len(kept))
         edges = Edges(corners, np.arange(len(kept)), place[self._next[kept]], body)
-        return edges, Discs(self._poses[discs, :2], self.radii[discs], discs)
+        return edges, Discs(self.poses[discs, :2], self.radii[discs], discs)
 
 
 @dataclass(frozen=True)
@@ -241,10 +230,18 @@ class MountedSensor:
                 Detections(things, drawn[:, :3] * deviations, drawn[:, 3:] * spec.velocity_noise))
 
     def _check(self, scan: Scan) -> None:
-        shape = (self.spec.rays,)
+        where, shape = f'sensor {self.spec.name}', (self.spec.rays,)
+        if not isinstance(scan, Scan) or not all(
+                isinstance(x, np.ndarray) and x.dtype.kind in kinds
+                for x, kinds in ((scan.angles, 'fi'), (scan.ranges, 'fi'), (scan.hits, 'i'))):
+            raise InputError('gives no scan of numbers, with integers as hits', where,
+                             'return a Scan of three NumPy arrays')
         if not (scan.angles.shape == scan.ranges.shape == scan.hits.shape == shape):
-            raise InputError('gives a scan of another length than its rays',
-                             f'sensor {self.spec.name}', f'give {self.spec.rays} of each')
+            raise InputError('gives a scan of another length than its rays', where,
+                             f'give {self.spec.rays} of each')
+        if np.isnan(scan.ranges).any():
+            raise InputError('gives a range that is no number (NaN)', where,
+                             'give inf where nothing is hit')
         if scan.hits.min() < PERMANENT or scan.hits.max() >= self._count:
-            raise InputError('hits a body that does not exist', f'sensor {self.spec.name}',
+            raise InputError('hits a body that does not exist', where,
                              f'use 0 to {self._count - 1}, -1 for nothing, -2 for the map')

@@ -134,7 +134,7 @@ class Observation:
     def _ranges(self, states: Sequence[VehicleState], poses: Array) -> Array:
         result = np.empty((len(states), self.spec.rays))
         for row, state, around in zip(result, states, poses, strict=True):
-            self._bodies.place(around)
+            self._bodies.poses = around
             x, y = ahead(state.x, state.y, state.yaw, self._to_center)
             scan = self._lidar.scan((x, y, state.yaw), self._bodies)
             row[:] = np.minimum(scan.ranges, self.spec.horizon)

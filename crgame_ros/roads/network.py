@@ -10,7 +10,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
 from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.polyline import EQUAL_DIGITS
-from crgame_ros.roads.signs import LIMITS, sign_elements, speed_limit_of
+from crgame_ros.roads.signs import speed_limit
 from crgame_ros.roads.surface import lanelet_areas
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ _NO_ROAD = {LaneletType.SIDEWALK, LaneletType.CROSSWALK, LaneletType.BORDER,
 # Half the greatest width of slits between lanelets [m]; smaller holes are no islands [m^2].
 _SLIT, _ISLAND = 0.5, 20.0
 _SLOW_USERS = {RoadUser.PEDESTRIAN, RoadUser.BICYCLE, RoadUser.TRAIN}
-_MOTORWAYS = {LaneletType.INTERSTATE, LaneletType.HIGHWAY}
+MOTORWAYS = {LaneletType.INTERSTATE, LaneletType.HIGHWAY}
 _FOR_PEOPLE = {LaneletType.SIDEWALK, LaneletType.CROSSWALK}
 # A drivable lane is preferred, unless another one fits the heading much better.
 _NOT_FOR_CARS_PENALTY = 0.2
@@ -230,10 +230,7 @@ class RoadNetwork:
 
     def speed_limit(self, lanelet_id: int) -> float | None:
         """Return the lowest speed limit of the lanelet's traffic signs [m/s], None without one."""
-        elements = sign_elements(self._lanelet(lanelet_id), self.lanelet_network, False)
-        limits = [speed_limit_of(element) for element in elements
-                  if element.traffic_sign_element_id.name in LIMITS]
-        return min((limit for limit in limits if limit is not None), default=None)
+        return speed_limit(self._lanelet(lanelet_id), self.lanelet_network)
 
     def is_drivable(self, lanelet_id: int, vehicle_type: str | None = None) -> bool:
         """
@@ -321,7 +318,7 @@ def _is_for_bicycles(lanelet: Lanelet) -> bool:
     users = lanelet.user_one_way | lanelet.user_bidirectional
     if RoadUser.BICYCLE in users or LaneletType.BICYCLE_LANE in lanelet.lanelet_type:
         return True
-    return not lanelet.lanelet_type & (_NOT_FOR_CARS | _MOTORWAYS) and (
+    return not lanelet.lanelet_type & (_NOT_FOR_CARS | MOTORWAYS) and (
         not users or bool(users & {RoadUser.VEHICLE, RoadUser.CAR}))
 
 

@@ -108,6 +108,8 @@ def _shortest(roads: RoadNetwork, start: int, start_s: float,
     """Find the way by Dijkstra: (lanelet, reached by lane change) in order; empty without one."""
     queue: list[tuple[float, int]] = [(0.0, start)]
     cost = {start: 0.0}
+    # Where the way enters a lanelet [m]: a lane change leads on from beside.
+    begins = {start: start_s}
     came: dict[int, tuple[int, bool]] = {}
     while queue:
         so_far, lanelet = heapq.heappop(queue)
@@ -115,11 +117,12 @@ def _shortest(roads: RoadNetwork, start: int, start_s: float,
             continue
         if lanelet in goals:
             return _unwind(lanelet, start, came)
-        available = roads.line(lanelet).length - (start_s if lanelet == start else 0.0)
+        available = roads.line(lanelet).length - begins[lanelet]
         for follower, step, changed in _edges(roads, lanelet, max(available, 1.0)):
             total = so_far + step
             if total < cost.get(follower, math.inf):
                 cost[follower] = total
+                begins[follower] = begins[lanelet] if changed else 0.0
                 came[follower] = (lanelet, changed)
                 heapq.heappush(queue, (total, follower))
     return []

@@ -67,6 +67,13 @@ def speed_limit_of(element: TrafficSignElement) -> float | None:
     return value if math.isfinite(value) and value > 0.0 else None
 
 
+def speed_limit(lanelet: Lanelet, roads: LaneletNetwork) -> float | None:
+    """Return the lowest speed limit of a lanelet's own signs [m/s], None without one."""
+    limits = [speed_limit_of(element) for element in sign_elements(lanelet, roads, False)
+              if element.traffic_sign_element_id.name in LIMITS]
+    return min((limit for limit in limits if limit is not None), default=None)
+
+
 def has_stop_sign(lanelet: Lanelet, roads: LaneletNetwork) -> bool:
     """
     Return whether a sign demands a halt on a lanelet: at its stop line, or else at its end.

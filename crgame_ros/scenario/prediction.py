@@ -136,7 +136,7 @@ class LanePrediction:
         self._ensure_reach(_MIN_REACH)
         if len(obstacles.living) and self._used:
             self._lookup = LaneLookup(
-                [self._lane_samples(lane) for lane in self._used], _SPACING, _MAX_LANE_ANGLE)
+                [self._lane_samples(lane) for lane in self._used], _SPACING)
 
     def predict(self, k: int, steps: int, now: ObjectStates | None = None,
                 changed: Sequence[int] = ()) -> tuple[FloatArray, FloatArray]:
@@ -184,7 +184,7 @@ class LanePrediction:
         if not len(columns):
             return
         place = self._place if self._lookup is None else self._lookup.find
-        lane, s, d = place(now.poses[columns])
+        lane, s, d = place(now.poses[columns], self._max_angles[columns])
         found = lane != _NO_LANE
         if found.any():
             poses[:, columns[found]] = self._along_lanes(
@@ -217,13 +217,13 @@ class LanePrediction:
         # Include the lanes that a held obstacle will use, so that none is sampled during the run.
         for column in self._obstacles.held:
             if self._follows_lanes[column]:
-                self._place(self._obstacles.track(column)[0])
+                poses = self._obstacles.track(column)[0]
+                self._place(poses, np.full(len(poses), self._max_angles[column]))
 
-    def _place(self, poses: FloatArray, max_angles: FloatArray | float = _MAX_LANE_ANGLE,
+    def _place(self, poses: FloatArray, max_angles: FloatArray,
                ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
         """Return the index among the used lanes, or -1, and s and d of poses (N, 3)."""
         found = self._network.lanelets_at(poses)
-        limits = np.broadcast_to(max_angles, len(poses))
         lanes = np.full(len(poses), _NO_LANE, dtype=np.int64)
         along_line, aside = np.zeros(len(poses)), np.zeros(len(poses))
         for lane in [int(lane) for lane in np.unique(found[found >= 0])]:
@@ -231,7 +231,7 @@ class LanePrediction:
             line = self._network.line(self._network.lanelet_ids[lane])
             s, d = line.project(poses[where, :2])
             yaw = line.heading_at(s)
-            along = np.abs(wrap_pi_array(poses[where, 2] - yaw)) <= limits[where]
+            along = np.abs(wrap_pi_array(poses[where, 2] - yaw)) <= max_angles[where]
             where = where[along]
             lanes[where] = self._number(lane)
             along_line[where], aside[where] = s[along], d[along]
@@ -272,10 +272,9 @@ class LaneLookup:
 
     :param tables: poses (n, 3) along the centre line of each lane, at equal distances.
     :param spacing: that distance [m]
-    :param max_angle: greatest angle between a pose and a lane on which it drives [rad]
     """
 
-    def __init__(self, tables: Sequence[FloatArray], spacing: float, max_angle: float) -> None:
+    def __init__(self, tables: Sequence[FloatArray], spacing: float) -> None:
         # A slow import, which only some predictions need.
         from scipy.spatial import cKDTree
         tables = [table[::STRIDE] for table in tables]
@@ -284,20 +283,22 @@ class LaneLookup:
         starts = np.concatenate(([0], np.cumsum([len(table) for table in tables])[:-1]))
         self._s = STRIDE * spacing * (np.arange(len(self._poses)) - starts[self._lane])
         self._tree = cKDTree(self._poses[:, :2])
-        self._max_angle = max_angle
 
-    def find(self, poses: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    def find(self, poses: FloatArray, max_angles: FloatArray,
+             ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
         """
         Return lane (-1: none), arc length and offset to the left of poses (N, 3).
 
         Of the lanes whose direction fits, it is the one whose centre line is nearest.
+
+        :param max_angles: (N) greatest angles to a lane on which they drive [rad]
         """
         count = min(CANDIDATES, len(self._poses))
         distance, sample = self._tree.query(poses[:, :2], k=count, distance_upper_bound=REACH)
         distance, sample = distance.reshape(-1, count), sample.reshape(-1, count)
         known = np.minimum(sample, len(self._poses) - 1)
         angle = np.abs(wrap_pi_array(poses[:, None, 2] - self._poses[known, 2]))
-        cost = np.round(np.where(angle <= self._max_angle, distance, math.inf), EQUAL_DIGITS)
+        cost = np.round(np.where(angle <= max_angles[:, None], distance, math.inf), EQUAL_DIGITS)
         # Lanes that fork lie upon each other at first: of equally near ones the first counts.
         nearest_first = cost == cost.min(axis=1, keepdims=True)
         best = np.argmin(np.where(nearest_first, known, len(self._poses)), axis=1)

@@ -259,8 +259,10 @@ def _fit_speed(network: RoadNetwork, parameters: VehicleParameters, scene: _Scen
     back, parts = 0.0, [network.lane_path(lanelet, _SIGHT)]
     before = network.straightest_predecessor(lanelet)
     while before is not None and back < _SIGHT:
-        parts.insert(0, network.line(before).points)
-        back += network.line(before).length
+        points = network.line(before).points
+        # The line closes the gap between two lanelets.
+        back += network.line(before).length + math.dist(points[-1], parts[0][0])
+        parts.insert(0, points)
         before = network.straightest_predecessor(before)
     line = Curve.from_polyline(np.concatenate(parts))
     s_obj, d_obj = line.project(scene.centers)

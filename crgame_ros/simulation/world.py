@@ -7,7 +7,6 @@ from typing import Protocol, TYPE_CHECKING
 
 from crgame_ros.game.events import EventSpec, SpeedLimit, TrafficOrder
 from crgame_ros.game.objects import ObjectStates
-from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.roads.speed_limits import set_speed_limit, with_own_roads
 from crgame_ros.scenario.loading import LoadedScenario
@@ -39,7 +38,7 @@ class TrafficOrders:
         """Apply an order to the agents, from their next decision on."""
         if isinstance(order, SpeedLimit):
             set_speed_limit(self._scenario, order.speed, order.lanelets)
-            traffic.read_speed_limits(RoadNetwork(self._scenario.lanelet_network))
+            traffic.read_speed_limits(self._scenario.lanelet_network)
         else:
             traffic.change(order)
 

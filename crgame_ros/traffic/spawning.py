@@ -39,21 +39,31 @@ FIRM, STOP_GAP = 2.0, 2.0
 CLOSE_TIME = 0.25
 
 
+def _seen_from(pose: FloatArray, length: float, width: float,
+               bodies: Bodies) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """
+    Return where bodies (B) are, seen from a vehicle.
+
+    :return: distances of the centres ahead and to either side, and those at which the two touch
+        along and across [m]
+    """
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    east, north = bodies.poses[:, 0] - pose[0], bodies.poses[:, 1] - pose[1]
+    turn = bodies.poses[:, 2] - pose[2]
+    along, across = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+    return (east * cos + north * sin, np.abs(north * cos - east * sin),
+            0.5 * (length + bodies.length * along + bodies.width * across),
+            0.5 * (width + bodies.length * across + bodies.width * along))
+
+
 def safe_speed(pose: FloatArray, length: float, width: float, agents: Agents,
                others: Bodies) -> float:
     """Return the speed from which firm braking suffices behind all vehicles ahead."""
-    here = np.flatnonzero(agents.active)
-    poses = np.concatenate((agents.centers()[here], others.poses))
-    lengths = np.concatenate((agents.length[here], others.length))
-    widths = np.concatenate((agents.width[here], others.width))
-    velocities = np.concatenate((agents.velocities()[here], others.velocities))
-    cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    east, north = poses[:, 0] - pose[0], poses[:, 1] - pose[1]
-    ahead, aside = east * cos + north * sin, np.abs(north * cos - east * sin)
-    turn = poses[:, 2] - pose[2]
-    wide = 0.5 * (width + lengths * np.abs(np.sin(turn)) + widths * np.abs(np.cos(turn)))
-    gap = ahead - 0.5 * (length + lengths) - STOP_GAP
-    along = np.maximum(velocities[:, 0] * cos + velocities[:, 1] * sin, 0.0)
+    bodies = with_agents(others, agents.table)
+    ahead, aside, _, wide = _seen_from(pose, length, width, bodies)
+    gap = ahead - 0.5 * (length + bodies.length) - STOP_GAP
+    along = np.maximum(bodies.velocities[:, 0] * np.cos(pose[2])
+                       + bodies.velocities[:, 1] * np.sin(pose[2]), 0.0)
     before = (ahead > 0.0) & (aside < wide + SIDE_GAP)
     safe = np.sqrt(along[before]**2 + 2.0 * FIRM * np.maximum(gap[before], 0.0))
     return float(safe.min(initial=np.inf))
@@ -66,23 +76,11 @@ def is_free(pose: FloatArray, speed: float, length: float, width: float, agents:
 
     :param close: whether a small gap is enough, as for a recorded newcomer.
     """
-    here = np.flatnonzero(agents.active)
-    poses = np.concatenate((agents.centers()[here], others.poses))
-    if not len(poses):
-        return True
-    lengths = np.concatenate((agents.length[here], others.length))
-    widths = np.concatenate((agents.width[here], others.width))
-    speeds = np.concatenate((agents.speed[here], np.hypot(*others.velocities[:, :2].T)))
-    cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    east, north = poses[:, 0] - pose[0], poses[:, 1] - pose[1]
-    ahead = east * cos + north * sin
-    along, aside = np.abs(ahead), np.abs(north * cos - east * sin)
-    turn = poses[:, 2] - pose[2]
-    long = 0.5 * (length + lengths * np.abs(np.cos(turn)) + widths * np.abs(np.sin(turn)))
-    wide = 0.5 * (width + lengths * np.abs(np.sin(turn)) + widths * np.abs(np.cos(turn)))
+    bodies = with_agents(others, agents.table)
+    ahead, aside, long, wide = _seen_from(pose, length, width, bodies)
+    speeds = np.concatenate((np.hypot(*others.velocities[:, :2].T), agents.speed[agents.active]))
     # An agent that changes lanes takes both.
-    wide += np.concatenate((np.where(agents.source[here] != NONE, LANE, 0.0),
-                            np.zeros(len(others.length))))
+    wide += np.where(bodies.claim != NONE, LANE, 0.0)
     gap = 0.5 if close else START_GAP + START_TIME * np.maximum(speeds, speed)
     if not close:
         # The vehicle behind has to slow down if it is faster.
@@ -94,7 +92,7 @@ def is_free(pose: FloatArray, speed: float, length: float, width: float, agents:
         gap = gap + closing / (2.0 * FIRM) + CLOSE_TIME * np.where(
             ahead < 0.0, speeds, np.minimum(speeds, speed))
     side = 0.2 if close else SIDE_GAP
-    return bool(((along > long + gap) | (aside > wide + side)).all())
+    return bool(((np.abs(ahead) > long + gap) | (aside > wide + side)).all())
 
 
 CAR, TRUCK = Shape.rectangle(4.5, 1.8), Shape.rectangle(8.0, 2.4)
@@ -102,6 +100,8 @@ BICYCLE = MOVER_TYPES['bicycle'].shape
 # Recorded cars are larger now and then.
 LARGE_CAR = Shape.rectangle(5.0, 1.9)
 TRIES = 40
+# Nothing arrives at lanes of this length or less [m].
+SHORTEST_ENTRY = 10.0
 # Longer vehicles need wide ways [m]; those of this length are no vehicles.
 LONG, LIMIT = 6.5, 30.0
 # No agent arrives while more than this share of all has stood for this time [s]: more vehicles
@@ -173,7 +173,7 @@ class Spawner:
         self._desired = desired
         self._random = generator
         self._time_step_s = time_step_s
-        begins = (graph.predecessors[:, 0] < 0) & (graph.length > 10.0) & ~routes.drops
+        begins = routes.is_entry & (graph.length > SHORTEST_ENTRY) & ~routes.drops
         self.entries: IntArray = np.flatnonzero(begins) if flow > 0.0 else np.zeros(0, int)
         self._mean_s = 3600.0 / flow if flow > 0.0 else np.inf
         self._due = self._random.exponential(self._mean_s, len(self.entries)) if flow > 0.0 \
@@ -279,11 +279,18 @@ class Spawner:
         row = np.isin(slots, newcomers)
         agents.speed[slots[row]] = np.minimum(agents.speed[slots[row]], safe[row])
 
-    def resume(self, k: int, agents: Agents, poses: FloatArray, velocities: FloatArray) -> None:
-        """Place agents (A) at their poses at k, and remove the absent ones (NaN) from the road."""
+    def resume(self, k: int, agents: Agents, poses: FloatArray, velocities: FloatArray,
+               is_new: bool) -> None:
+        """
+        Place agents (A) at their poses at k, and remove the absent ones (NaN) from the road.
+
+        :param is_new: whether recorded vehicles that are absent may have left before.
+        """
         agents.remove(np.arange(agents.count), k)
-        self._waiting = [i for i in self._waiting if self._adopted[i].first_k > k]
-        for slot in np.flatnonzero(np.isfinite(poses).all(axis=1)).tolist():
+        present = np.flatnonzero(np.isfinite(poses).all(axis=1)).tolist()
+        self._waiting = [i for i in self._waiting if i not in present
+                         and (not is_new or self._adopted[i].first_k > k)]
+        for slot in present:
             x, y, yaw = (float(value) for value in poses[slot])
             lane = self._graph.index.get(self._graph.network.nearest_lanelet(x, y, yaw))
             if lane is not None:

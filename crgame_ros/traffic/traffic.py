@@ -5,6 +5,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from commonroad.scenario.lanelet import LaneletNetwork
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.game.events import ALL_AGENTS, TrafficChange
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
@@ -122,19 +123,21 @@ class Traffic:
         """Return the states of all agents at the present k; NaN where absent."""
         return ObjectStates(*self._agents.states())
 
-    def resume(self, k: int, states: ObjectStates) -> None:
+    def resume(self, k: int, states: ObjectStates, is_new: bool = True) -> None:
         """
-        Restore the agents after a restart from the states that others have received.
+        Restore the agents after a gap from the states that others have received.
 
         Internal state is new: destinations, characters and grants at junctions.
 
         :param states: of all `descriptions` at k.
+        :param is_new: whether this object was made after the run began: it cannot know which
+            recorded vehicles have left, so that only later ones appear.
         """
-        self._spawner.resume(k, self._agents, states.poses, states.velocities)
+        self._spawner.resume(k, self._agents, states.poses, states.velocities, is_new)
 
-    def read_speed_limits(self, network: RoadNetwork) -> None:
+    def read_speed_limits(self, roads: LaneletNetwork) -> None:
         """Read the speed limits of roads that are the same as before otherwise."""
-        self._graph.read_speed_limits(network)
+        self._graph.read_speed_limits(roads)
 
     def change(self, change: TrafficChange) -> None:
         """Change how agents drive from the next decision on, as an event demands."""

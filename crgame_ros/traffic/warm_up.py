@@ -8,6 +8,7 @@ import fcntl
 from functools import cache
 import os
 from pathlib import Path
+import signal
 import sys
 import time
 
@@ -56,8 +57,8 @@ def _turn(say: Callable[[str], None]) -> Iterator[None]:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            _hurry(lock)
-            say('another process compiles traffic: waiting for it')
+            if not _end_idle(lock):
+                say('another process compiles traffic: waiting for it')
             fcntl.flock(handle, fcntl.LOCK_EX)
         handle.truncate(0)
         handle.write(str(os.getpid()))
@@ -65,10 +66,18 @@ def _turn(say: Callable[[str], None]) -> Iterator[None]:
         yield
 
 
-def _hurry(lock: Path) -> None:
-    """Raise the priority of the process that compiles from idle to ordinary."""
+def _end_idle(lock: Path) -> bool:
+    """
+    End the process that compiles if it gets idle processor time only: it would take too long.
+
+    What it has compiled is kept. To raise its priority takes rights that users lack.
+    """
     with suppress(ValueError, OSError):
-        os.sched_setscheduler(int(lock.read_text()), os.SCHED_OTHER, os.sched_param(0))
+        process = int(lock.read_text())
+        if os.sched_getscheduler(process) == os.SCHED_IDLE:
+            os.kill(process, signal.SIGTERM)
+            return True
+    return False
 
 
 def _compile(say: Callable[[str], None]) -> None:

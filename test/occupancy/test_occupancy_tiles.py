@@ -202,6 +202,13 @@ def test_more_than_fits_is_refused(tmp_path: Path) -> None:
     assert occupancy.fits(far[:1], 1.0)
     with pytest.raises(InputError, match='6 tiles are wanted at once, more than 4'):
         occupancy.near(far, 1.0)
+    # Tiles of 4 m: 3.8 m are in 2 of them at most, 4.2 m in 3.
+    assert occupancy.fits_anywhere(1.9) and not occupancy.fits_anywhere(2.1)
+    corner = np.array([ORIGIN]) + 4.0
+    assert occupancy.fits(corner, 1.9) and not occupancy.fits(corner + 2.0, 2.1)
+    # A map of one row has no more, however far one sees.
+    row = tiled(tmp_path / 'row', {(0, 0): np.ones((8, 8), dtype=bool)}, (1, 4))
+    assert TiledOccupancy(row, max_cells=4 * 64).fits_anywhere(1000.0)
     with pytest.raises(InputError, match='a tile has 64 cells, more than 10'):
         TiledOccupancy(tmp_path / 'map', max_cells=10)
 

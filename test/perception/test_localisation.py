@@ -134,6 +134,15 @@ def test_dropouts_come_as_often_as_they_should() -> None:
     assert 1.0 - np.mean(lost) == pytest.approx(math.exp(-0.5), abs=0.06)
 
 
+def test_it_may_begin_at_any_step() -> None:
+    """As after a restart: 100 m on it begins there, not a whole run's way farther."""
+    course = straight(1001, 10.0)
+    localisation = Localisation(LocalisationSpec(), 1, 'av0', course[1000], DT, 1000)
+    localisation.step(1001, course[1001])
+    assert not localisation.lost
+    assert np.hypot(localisation.estimate.x - course[1001].x, localisation.estimate.y) < 2.0
+
+
 def test_standing_still() -> None:
     """At rest the estimate stays in place without rolling back, and its covariance is valid."""
     course = [VehicleState(3.0, 4.0, math.pi, 0.0)] * 2001

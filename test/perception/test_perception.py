@@ -312,17 +312,24 @@ class Wall:
         self.asked.append((*points[0].tolist(), reach_m))
         return OccupancyGrid((12.0, -20.0), 0.5, np.ones((80, 1), dtype=bool))
 
+    def fits_anywhere(self, reach_m: float) -> bool:
+        return reach_m < 100.0
 
-@pytest.mark.parametrize('as_function', [False, True])
-def test_permanent_obstacles_hide_objects(as_function: bool) -> None:
+
+def test_permanent_obstacles_hide_objects() -> None:
     """A car behind a wall is unknown; the map is queried around the sensor to its horizon."""
     wall = Wall()
     objects = [(CAR, (20.0, 0.0, 0.0), (0.0, 0.0, 0.0))]
-    world = World(objects, [FRONT], occupancy=wall.near if as_function else wall).run(0, 0)
+    world = World(objects, [FRONT], occupancy=wall).run(0, 0)
     assert not world.knows(0, 'o3')
     assert (world.perception.scans[0][2].hits == PERMANENT).any()
     assert wall.asked == [pytest.approx((VEHICLE.rear_to_center + 0.5 * VEHICLE.length, 0.0,
                                          80.0))]
+
+
+def test_a_sensor_that_sees_too_much_of_the_map_is_refused_before_the_run() -> None:
+    with pytest.raises(InputError, match='sensor front of av0: sees 400 m far'):
+        World([], [replace(FRONT, horizon=400.0)], occupancy=Wall())
 
 
 def test_objects_are_moved_on_between_scenario_steps() -> None:
@@ -400,7 +407,16 @@ def test_a_sensor_of_the_users_own(tmp_path: Any) -> None:
         '    def scan(self, pose, bodies, grid=None):\n'
         '        rays = self.spec.rays - self.left_out\n'
         '        hits = np.full(rays, self.body)\n'
-        '        return Scan(np.zeros(rays), np.ones(rays), hits)\n')
+        '        return Scan(np.zeros(rays), np.ones(rays), hits)\n'
+        'class Wrong(Sensor):\n'
+        '    def __init__(self, spec, kind: str) -> None:\n'
+        '        super().__init__(spec)\n'
+        '        self.kind = kind\n'
+        '    def scan(self, pose, bodies, grid=None):\n'
+        '        hits, ones = np.full(self.spec.rays, -1), np.ones(self.spec.rays)\n'
+        '        return {"nothing": None, "list": Scan(ones, ones.tolist(), hits),\n'
+        '                "real": Scan(ones, ones, -ones),\n'
+        '                "nan": Scan(ones, ones * np.nan, hits)}[self.kind]\n')
     model = f'{tmp_path}/blind.py:Only'
     objects = [(CAR, (-20.0, 0.0, 0.0), (0.0, 0.0, 0.0))]
     world = World(objects, [replace(FRONT, model=model, options={'body': 1})]).run(0, 0)
@@ -411,5 +427,10 @@ def test_a_sensor_of_the_users_own(tmp_path: Any) -> None:
         World(objects, [replace(FRONT, model=model, options={'body': 2})]).run(0, 0)
     with pytest.raises(InputError, match='give 361 of each'):
         World(objects, [replace(FRONT, model=model, options={'body': 1, 'left_out': 1})]).run(0, 0)
+    for kind, message in (('nothing', 'no scan'), ('list', 'no scan'), ('real', 'no scan'),
+                          ('nan', 'NaN')):
+        with pytest.raises(InputError, match=f'sensor front: gives .*{message}'):
+            World(objects, [replace(FRONT, model=f'{tmp_path}/blind.py:Wrong',
+                                    options={'kind': kind})]).run(0, 0)
     with pytest.raises(InputError, match='there is no sensor "radar"; known are ray-caster'):
         World(objects, [replace(FRONT, model='radar')])

@@ -29,7 +29,7 @@ KINDS = {'rectangles': [Shape.rectangle(4.5, 1.8)], 'circles': [Shape.circle(0.3
 def bodies_of(shapes: list[Shape], poses: Any) -> SensedBodies:
     bodies = SensedBodies([ObjectDescription(f'o{i}', 'car', Role.RECORDED, shape)
                            for i, shape in enumerate(shapes)])
-    bodies.place(np.array(poses, dtype=float).reshape(-1, 3))
+    bodies.poses = np.array(poses, dtype=float).reshape(-1, 3)
     return bodies
 
 

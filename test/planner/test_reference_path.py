@@ -12,6 +12,7 @@ from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
+from made_roads import made, Piece
 import numpy as np
 import planner_support as support
 import pytest
@@ -57,6 +58,15 @@ def test_route_changes_lanes_to_reach_the_goal(vehicle: VehicleParameters) -> No
     assert (np.diff(y) > -1e-3).all()
     # A quintic blend of 3.5 m over 40 m bends by at most 5.77 * 3.5 / 40^2 = 0.0126 1/m.
     assert np.abs(driving.path.curvature).max() < 0.0135
+
+
+def test_what_is_behind_a_lane_change_costs_nothing() -> None:
+    """50 m before its end the lane beside leads to the goal; ahead it is 100 m farther."""
+    roads = made({1: Piece((0.0, 0.0, 0.0), 200.0, after=(4,), left=2),
+                  2: Piece((0.0, 3.5, 0.0), 200.0, after=(3,), right=1),
+                  3: Piece((200.0, 3.5, 0.0), 50.0),
+                  4: Piece((200.0, 0.0, 0.0), 100.0, after=(3,))})
+    assert find_route(roads, 1, 150.0, frozenset({3}), 0.0).legs == ((1,), (2, 3))
 
 
 def test_without_a_reachable_goal_the_lane_is_followed(vehicle: VehicleParameters) -> None:

@@ -24,9 +24,11 @@ def test_of_lanes_that_lie_upon_each_other_the_first_counts(degrees: float) -> N
 
     tables = [turned(straight + np.stack((0.0 * s, side * aside, 0.0 * s), axis=-1))
               for side in (1.0, -1.0)]
-    lookup = LaneLookup(tables, 0.5, math.radians(45.0))
+    lookup = LaneLookup(tables, 0.5)
     poses = np.array([(x, y, 0.1) for x in np.linspace(1.0, 18.0, 41) for y in (-0.7, 0.0, 0.9)])
-    lanes, along, offset = lookup.find(turned(poses))
+    lanes, along, offset = lookup.find(turned(poses), np.full(len(poses), 0.2))
     assert np.all(lanes == 0)
     assert along == pytest.approx(poses[:, 0], abs=1e-9)
     assert offset == pytest.approx(poses[:, 1], abs=1e-9)
+    # Of two at the same angle only the one that may cross lanes less steeply is in none.
+    assert lookup.find(turned(poses[:2]), np.array([0.05, 0.2]))[0].tolist() == [-1, 0]

@@ -154,6 +154,16 @@ def test_bicycle_along_the_lane_follows_it() -> None:
     assert prediction.predict(0, 30)[0][30, 0, 2] == pytest.approx(30.0 / RADIUS, abs=1e-3)
 
 
+@pytest.mark.parametrize('changed', [(), (0,)])
+def test_a_bicycle_that_crosses_a_lane_goes_straight_on_wherever_it_is(
+        changed: tuple[int, ...]) -> None:
+    """At 25 degrees to the lane, which a car would follow; at its recorded place or not."""
+    for kind, straight in (('bicycle', True), ('car', False)):
+        obstacles, prediction = lane_world(kind, math.radians(25.0))
+        yaw = prediction.predict(0, 30, obstacles.states_at(0), changed)[0][:, 0, 2]
+        assert bool(np.ptp(yaw) == 0.0) is straight
+
+
 @pytest.mark.matrix('USA_Lanker-1_3_T-1.xml', 'ZAM-Ramp-1_1-T-1.xml')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', [*BUSY, 'ZAM_Tutorial-1_2_T-1.xml', 'ZAM-Ramp-1_1-T-1.xml'])

@@ -17,6 +17,7 @@ from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.state import VehicleState
+from made_roads import made, Piece
 import numpy as np
 import pytest
 import shapely
@@ -148,6 +149,19 @@ def test_speed_is_limited_by_a_standing_leader() -> None:
                         ObjectStates(np.array([[x, y, yaw]]), np.zeros((1, 3))))
     gap = math.dist((x, y), human.center(CAR.rear_to_center)) - CAR.length / 2 - 1.0
     assert gap == pytest.approx(20.0, abs=0.2)
+    assert human.speed + human.speed ** 2 / 8.0 == pytest.approx(gap, abs=1e-3)
+
+
+def test_gaps_between_lanelets_behind_do_not_hide_how_near_a_leader_is() -> None:
+    """As above, behind ten lanelets of 10 m with gaps of 0.9 m between them."""
+    pieces = {i: Piece((10.9 * (i - 11), 0.0, 0.0), 10.0, after=(i + 1,)) for i in range(1, 11)}
+    road = made({**pieces, 11: Piece((0.0, 0.0, 0.0), 150.0, left=12),
+                 12: Piece((0.0, 3.5, 0.0), 150.0, right=11)})
+    wall = ObjectDescription('o1', 'unknown', Role.STATIC, Shape.rectangle(2.0, 3.0))
+    human = place_human(road, HumanSpec('hv0'), CAR, [VehicleState(60.0, 3.5, 0.0, 30.0)], [wall],
+                        ObjectStates(np.array([[80.0, 0.0, 0.0]]), np.zeros((1, 3))))
+    assert human.y == 0.0
+    gap = 79.0 - human.center(CAR.rear_to_center)[0] - CAR.length / 2
     assert human.speed + human.speed ** 2 / 8.0 == pytest.approx(gap, abs=1e-3)
 
 

@@ -6,10 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from crgame_ros.game.events import TrafficChange
+from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.traffic.fleet.agents import Agents
 from crgame_ros.traffic.fleet.world_view import WorldView
+from crgame_ros.traffic.following.drivers import Drivers
+from crgame_ros.traffic.following.leaders import Followers
 from crgame_ros.traffic.warm_up import crossroads, LIGHT
 import numpy as np
 import pytest
@@ -30,6 +34,19 @@ def test_a_driver_that_reacts_late_brakes_as_much_later() -> None:
               for run in (quick, late)]
     assert brakes[1] - brakes[0] == 8
     assert late.overlaps() == []
+
+
+def test_a_newcomer_does_not_carry_out_decisions_of_the_agent_that_had_its_slot() -> None:
+    agents = Agents([ObjectDescription(f't{i}', 'car', Role.TRAFFIC, support.CAR)
+                     for i in range(2)])
+    agents.speed[:] = 10.0
+    drivers = Drivers(TrafficSpec(reaction_time=1.0), agents, Followers('acc', {}, 2), 0.1,
+                      np.random.default_rng(0))
+    for k in range(13):
+        # The first leaves after k = 4, and another one has its slot from k = 12 on.
+        slots = np.arange(2) if k < 5 or k == 12 else np.array([1])
+        done = drivers.do(k, agents, slots, np.where(slots == 0, 1.0 - k, 0.1 * k))
+    assert done.tolist() == pytest.approx([-11.0, 0.2])
 
 
 def test_imperfection_slows_by_half_of_its_share_and_repeats_with_the_seed() -> None:

@@ -5,7 +5,7 @@
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.traffic.fleet.agents import Agents
+from crgame_ros.traffic.fleet.agents import Agents, centers_of
 from crgame_ros.traffic.following.encounters import BEFORE, BESIDE, FIRMEST, needed_braking
 from crgame_ros.traffic.lanes.lane_graph import LaneGraph
 import numpy as np
@@ -36,7 +36,7 @@ def meeting(graph: LaneGraph, places: list[float], speeds: list[float]) -> Agent
 
 def touch(agents: Agents, braking: float, room: float) -> bool:
     """Return whether two cars that drive straight on touch, the first of them braking."""
-    poses, velocities = agents.centers(), agents.speed
+    poses, velocities = centers_of(agents.table, np.arange(2))[0], agents.speed
     for t in np.arange(STEP, HORIZON + STEP, STEP):
         shapes = []
         for i, slows in ((0, braking), (1, 0.0)):

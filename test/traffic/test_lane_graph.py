@@ -4,8 +4,10 @@
 
 from pathlib import Path
 
+from commonroad.common.common_lanelet import LaneletType
 from crgame_ros.errors import InputError
 from crgame_ros.roads.network import RoadNetwork
+from crgame_ros.roads.speed_limits import set_speed_limit
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.traffic.lanes.lane_cells import cell_of, LaneCells
 from crgame_ros.traffic.lanes.lane_graph import LaneGraph
@@ -49,6 +51,18 @@ def test_curvature_is_that_of_the_circle(maps: Path) -> None:
     x, y = graph.x[rows], graph.y[rows]
     # The circle is around the origin.
     np.testing.assert_allclose(1.0 / graph.curvature[rows], np.hypot(x, y), rtol=0.03)
+
+
+@pytest.mark.parametrize(('types', 'kmh'), [
+    ({LaneletType.INTERSTATE, LaneletType.ACCESS_RAMP}, 130.0), ({LaneletType.HIGHWAY}, 130.0),
+    ({LaneletType.COUNTRY}, 100.0), ({LaneletType.URBAN}, 50.0), (set(), 50.0)])
+def test_without_a_speed_limit_the_type_of_the_lane_counts(types: set[LaneletType],
+                                                           kmh: float) -> None:
+    scenario = support.roads(support.straight_lane(1, 0.0, 0.0, 100.0, lanelet_type=types),
+                             support.straight_lane(2, 9.0, 0.0, 100.0, lanelet_type=types))
+    set_speed_limit(scenario, 7.0, (2,))
+    graph = LaneGraph(RoadNetwork(scenario.lanelet_network))
+    assert graph.limit.tolist() == pytest.approx([kmh / 3.6, 7.0], abs=0.02)
 
 
 def test_lanes_near_a_point_hold_every_lane_that_contains_it(maps: Path) -> None:

@@ -112,11 +112,10 @@ def test_steering_keeps_its_limits() -> None:
 @pytest.mark.exhaustive
 def test_a_swerve_of_the_elastic_band_is_driven_with_its_clearance() -> None:
     """Along d(s) of a straight lane at its speed: the centre stays within 0.25 m of the band."""
-    band = ElasticBand()
-    found = Obstacles(np.zeros(1, dtype=np.intp), *np.array([[150.0], [0.0], [2.25], [0.9]]))
+    planner = ElasticBand()
+    found = Obstacles(*np.array([[150.0], [0.0], [2.25], [0.9]]))
     for value in (5.0, 14.0, 25.0):
-        d = band.relax(np.full((1, 301), 5.25), np.full((1, 301), 1.75), np.array([value]),
-                       found).d[0]
+        d = planner.relax(np.full(301, 5.25), np.full(301, 1.75), value, found).d
         x, y, yaw, steering = (np.zeros(1) for _ in range(4))
         speed, wheelbase, beside = np.array([value]), np.array([2.6]), []
         while x[0] < 270.0:

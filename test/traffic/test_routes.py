@@ -58,6 +58,16 @@ def test_a_lane_that_ends_beside_one_that_goes_on_has_to_be_left() -> None:
     np.testing.assert_allclose(routes.remaining[0, 1], 200.0)
 
 
+def test_a_lane_that_begins_beside_one_from_farther_back_is_no_entry() -> None:
+    graph = LaneGraph(RoadNetwork(support.roads(
+        support.straight_lane(1, 0.0, 0.0, 200.0, successor=[2]),
+        support.straight_lane(2, 0.0, 200.0, 400.0, predecessor=[1], adjacent_right=3,
+                              adjacent_right_same_direction=True),
+        support.straight_lane(3, -3.5, 200.0, 400.0, adjacent_left=2,
+                              adjacent_left_same_direction=True)).lanelet_network))
+    assert Routes(graph).is_entry.tolist() == [True, False, False]
+
+
 def test_a_loop_without_an_exit_has_destinations_too() -> None:
     circle = [(30.0 * np.cos(a), 30.0 * np.sin(a)) for a in np.linspace(0.0, 2 * np.pi, 81)]
     halves = [support.lane_strip(1, circle[:41], successor=[2], predecessor=[2]),

@@ -194,6 +194,27 @@ def test_a_restart_goes_on_from_what_was_seen(maps: Path) -> None:
     assert np.nanmax(steps) < 3.0
 
 
+def test_recorded_vehicles_of_skipped_ticks_appear_unless_they_may_have_left() -> None:
+    """After a stall from k = 3 to k = 20 the same agents go on, or new ones take over."""
+    found = support.driving(7, [(20.0 + i, 0.0, 0.0) for i in range(100)], 10.0, first_k=5)
+    run = support.Run(one_lane(), TrafficSpec(recorded='reactive'), adopted=[found]).ticks(3)
+    nobody = run.traffic.states
+    for is_new in (False, True):
+        run.traffic.resume(20, nobody, is_new)
+        run.k = 20
+        assert np.isfinite(run.ticks(1).poses[-1][0]).all() != is_new
+
+
+def test_agents_that_were_published_appear_only_once() -> None:
+    """The agent of a recording may have left where it was when the ticks were skipped."""
+    found = support.driving(7, [(20.0 + i, 0.0, 0.0) for i in range(100)], 10.0)
+    run = support.Run(one_lane(), TrafficSpec(recorded='reactive'), adopted=[found]).ticks(3)
+    seen = run.traffic.states
+    for is_new in (False, True):
+        run.traffic.resume(20, seen, is_new)
+        np.testing.assert_allclose(run.traffic.states.poses, seen.poses, atol=1e-9)
+
+
 @pytest.mark.exhaustive
 def test_no_agent_arrives_into_a_jam() -> None:
     """Behind a wreck at the road's end the queue doesn't reach back to the road's beginning."""

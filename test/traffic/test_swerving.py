@@ -88,7 +88,7 @@ def test_a_slalom_is_slow_enough_for_its_clearance(spacing: float) -> None:
     graph, swerving = planned(*rows)
     step, s = 1.0, np.arange(301.0)
     d = np.interp(s, graph.step[0] * np.arange(graph.count[0]), swerving.reference)
-    boxes = Obstacles(np.zeros(5, dtype=np.intp), 100.0 + spacing * np.arange(5),
+    boxes = Obstacles(100.0 + spacing * np.arange(5),
                       np.array([-1.8 if i % 2 else 1.8 for i in range(5)]), np.full(5, 0.5),
                       np.full(5, 1.2))
     speed = float(cutting_speed(d, step, boxes).min())

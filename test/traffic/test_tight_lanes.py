@@ -46,6 +46,16 @@ def test_a_bend_is_too_tight_where_the_swept_width_is_more_than_the_lane(
     assert not for_cars[0]
 
 
+def test_a_corner_at_the_end_of_a_long_narrow_lane_is_found() -> None:
+    angle = np.linspace(0.0, np.pi / 2.0, 30)
+    corner = [(400.0 + 3.0 * np.sin(a), 3.0 - 3.0 * np.cos(a)) for a in angle]
+    graph = LaneGraph(RoadNetwork(support.roads(support.lane_strip(
+        1, [*((x, 0.0) for x in np.arange(0.0, 400.0, 10.0)), *corner, (403.0, 40.0)], 2.35,
+    )).lanelet_network))
+    for_cars, _ = find_tight_lanes(graph, [CAR], TRUCK)
+    assert for_cars.tolist() == [True]
+
+
 def test_recorded_vehicles_of_any_shape_are_tried_as_boxes() -> None:
     shapes = [Shape.circle(3.5), Shape.rectangle(12.0, 2.5), Shape.rectangle(9.0, 2.5),
               Shape.rectangle(300.0, 2.5), Shape.rectangle(4.5, 1.8)]

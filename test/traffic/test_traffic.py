@@ -7,7 +7,6 @@ from pathlib import Path
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.speed_limits import set_speed_limit
 from crgame_ros.traffic.fleet.adoption import Adopted
 from crgame_ros.traffic.following.car_following import CarFollowing
@@ -36,6 +35,18 @@ class FreeDriving(CarFollowing):
 
     def desired_gap(self, speed: np.ndarray) -> np.ndarray:
         return 2.0 + 1.5 * speed
+
+
+class SameGap(FreeDriving):
+    """A model whose gap is one number for all agents."""
+
+    def desired_gap(self, speed: np.ndarray) -> float:
+        return 5.0
+
+
+def test_a_law_may_have_one_gap_for_all(maps: Path) -> None:
+    spec = TrafficSpec(agents=25, flow=500.0, model=f'{__file__}:SameGap')
+    support.Run(maps / MERGE, spec, 0).ticks(100)
 
 
 def test_without_car_following_they_do_hit(maps: Path) -> None:
@@ -119,7 +130,7 @@ def test_a_lower_speed_limit_is_obeyed() -> None:
     scenario = support.roads(lane)
     run = support.Run(scenario, TrafficSpec(), 0, (), follower(20.0, 13.0)).ticks(50)
     set_speed_limit(scenario, 6.0)
-    run.traffic.read_speed_limits(RoadNetwork(scenario.lanelet_network))
+    run.traffic.read_speed_limits(scenario.lanelet_network)
     run.ticks(150)
     factor = run.series(0)[1][45] / 13.9
     assert run.series(0)[1][-1] == pytest.approx(6.0 * factor, rel=0.05)

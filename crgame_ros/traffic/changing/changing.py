@@ -251,9 +251,8 @@ class LaneChanges:
 
         :param gap, leader: (A) as in `Ahead`.
         """
-        wanted = self._followers.for_agents(slots).desired_gap(agents.speed[slots])
-        note_leaders(agents.table, slots, gap, leader, np.asarray(wanted, float), self._fading,
-                     self._cooperative)
+        wanted = self._followers.desired_gap(slots, agents.speed[slots])
+        note_leaders(agents.table, slots, gap, leader, wanted, self._fading, self._cooperative)
 
     def finish(self, k: int, agents: Agents) -> None:
         """End the changes that are complete, and those that make no progress."""
@@ -375,7 +374,7 @@ class LaneChanges:
     def _relieve(self, agents: Agents, slot: int, gap: float, speed: float) -> None:
         """Set the relief with which a driver slowly reopens a shortened gap (Hidas 2005)."""
         if self._cooperative and np.isfinite(gap):
-            wanted = self._followers.for_agents(np.array([slot])).desired_gap(np.array([speed]))
+            wanted = self._followers.desired_gap(np.array([slot]), np.array([speed]))
             agents.relief[slot] = max(agents.relief[slot], relief_at_change(
                 float(gap), float(wanted[0])))
 

@@ -9,6 +9,7 @@ import hashlib
 from importlib.metadata import version
 import os
 from pathlib import Path
+import platform
 import re
 import subprocess
 import sys
@@ -42,10 +43,22 @@ def digest(module: str) -> str:
             path = _PACKAGE.joinpath(*name.split('.')[1:])
             seen[name] = path.with_suffix('.py').read_bytes()
             pending += _IMPORT.findall(seen[name].decode('utf-8'))
-    result = hashlib.sha256(version('numba').encode())
+    result = hashlib.sha256('\n'.join((version('numba'), sys.version, _cpu())).encode())
     for name in sorted(seen):
         result.update(seen[name])
     return result.hexdigest()[:12]
+
+
+@cache
+def _cpu() -> str:
+    """Return the processor's model and features: others do not load code compiled for it."""
+    try:
+        lines = Path('/proc/cpuinfo').read_text().splitlines()
+    except OSError:
+        lines = []
+    return '\n'.join(sorted({line for line in lines if line.startswith(
+        ('model name', 'flags', 'Features'))})
+                     ) or platform.machine()
 
 
 def marker() -> Path:

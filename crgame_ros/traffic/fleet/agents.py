@@ -193,14 +193,6 @@ class Agents(AgentTable):
         vars(self).update(state)
         self._show_columns()
 
-    def centers(self) -> FloatArray:
-        """Return the poses (A, 3) of the centres [m, rad]."""
-        return centers_of(self.table, np.arange(self.count))[0]
-
-    def velocities(self) -> FloatArray:
-        """Return the (A, 3) velocities of the centres [m/s, rad/s]."""
-        return centers_of(self.table, np.arange(self.count))[1]
-
     def in_left_lanes(self, graph: LaneGraph, slots: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return s and d (N) of the centres of agents in the lanes that they change from [m]."""
         center, _ = centers_of(self.table, slots)

@@ -51,10 +51,12 @@ class Routes:
         self.onward = _straightest(graph)
         ends = graph.successors[:, 0] < 0
         side = [[j for j in (graph.left[i], graph.right[i]) if j >= 0] for i in lanes]
+        self.is_exit: NDArray[np.bool_] = _across_the_road(graph, ends)
         # A lane that ends beside one that goes on: agents on it have to merge.
-        self.drops: NDArray[np.bool_] = ends & np.array(
-            [not ends[_road(graph, int(i))].all() for i in lanes])
-        self.is_exit: NDArray[np.bool_] = ends & ~self.drops
+        self.drops: NDArray[np.bool_] = ends & ~self.is_exit
+        # A lane that begins beside one that comes from farther back is entered from there.
+        self.is_entry: NDArray[np.bool_] = _across_the_road(
+            graph, graph.predecessors[:, 0] < 0)
         links = [(i, j) for i in lanes[self.is_exit] for j in side[i] if self.is_exit[j]]
         pair = np.array(links, dtype=np.int64).reshape(-1, 2).T
         group = connected_components(csr_matrix(
@@ -213,6 +215,11 @@ def _road(graph: LaneGraph, lane: int) -> IntArray:
             members.add(current)
             current = int(side[current])
     return np.array(sorted(members))
+
+
+def _across_the_road(graph: LaneGraph, lanes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which of some lanes (L) have none but some of them beside them."""
+    return lanes & [bool(lanes[_road(graph, lane)].all()) for lane in range(len(graph))]
 
 
 @compiled

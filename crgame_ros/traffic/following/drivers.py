@@ -130,6 +130,8 @@ class Drivers:
                 self._decided[:] = np.nan
             self._last_k = k
             decided, size = self._decided, len(self._decided)
+            # A newcomer does not carry out the decisions of the agent that had its slot before.
+            decided[:, slots[np.isnan(decided[(k - 1) % size, slots])]] = np.nan
             decided[k % size] = np.nan
             decided[k % size, slots] = wanted
             before = decided[(k - self._delay[slots]) % size, slots]

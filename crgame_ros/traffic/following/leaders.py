@@ -303,6 +303,12 @@ class Followers:
             return self.usual
         return _Several(self._models, self._number[slots])
 
+    def desired_gap(self, slots: IntArray, speed: FloatArray) -> FloatArray:
+        """Return the steady gaps (N) of agents (N) at their speeds [m]."""
+        result = np.empty(len(slots))
+        result[:] = self.for_agents(slots).desired_gap(speed)
+        return result
+
     def change(self, slots: IntArray, options: Mapping[str, object]) -> None:
         """
         Change some options of the models of agents.

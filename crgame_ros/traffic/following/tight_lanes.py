@@ -64,7 +64,7 @@ ASIDES, ASIDE_COST = (0.3, 0.6, 0.9, 1.2), 0.012
 LONG_ASIDES, LONG_ASIDE_COST = (0.4, 0.7, 1.0, 1.3, 1.6), 0.03
 LATERAL, LATERAL_COST = 2.0, 0.005
 # Where a vehicle is off the road over more than this, its lane is broken and no swing helps [m].
-LONGEST = 50.0
+BROKEN = 50.0
 # Long vehicles may reach this far over the edges of their lanes [m].
 ASIDE = 0.6
 
@@ -106,7 +106,7 @@ def _swing_out(graph: LaneGraph, trials: Sequence['_Trials'], of: str) -> None:
     begin = np.min([x.begin for x in tight], axis=0)
     end = np.max([x.end for x in tight], axis=0)
     off = np.max([x.off for x in tight], axis=0)
-    for lanes in _apart(graph, np.flatnonzero((off > 0.0) & (end - begin < LONGEST))):
+    for lanes in _apart(graph, np.flatnonzero((off > 0.0) & (end - begin < BROKEN))):
         hats = {lane: _hats(graph, trials[0].front, lane, float(begin[lane]), float(end[lane]))
                 for lane in lanes}
         around = {lane: [lane, *_beside(graph, lane)] for lane in lanes}

@@ -2,14 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The lanes of a road network as flat arrays, for many agents at once."""
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import NamedTuple
 
+from commonroad.common.common_lanelet import LaneletType
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
-from crgame_ros.roads.network import RoadNetwork
+from crgame_ros.roads.network import MOTORWAYS, RoadNetwork
+from crgame_ros.roads.signs import speed_limit
 from crgame_ros.traffic.lanes.lane_table import LaneTable, point_records, poses_on, project_all
 from crgame_ros.traffic.lanes.pursuit import PURSUIT_TIME
 import numpy as np
@@ -78,6 +80,8 @@ MAX_GAP = 1.0
 DEGENERATE = 2.5
 # Headings of published centre lines jump at vertices; they are smoothed over this length [m].
 SMOOTHING = 4.0
+# Speeds of lanes without a speed limit: of a motorway's type, of a country road's, others [m/s].
+MOTORWAY_SPEED, COUNTRY_SPEED, TOWN_SPEED = 130.0 / 3.6, 100.0 / 3.6, 13.9
 # Least angle between lanes that slows agents down [rad], and over which distance behind it [m].
 LEAST_KINK, KINK_REACH = 0.03, 4.0
 
@@ -91,13 +95,11 @@ class LaneGraph:
 
     :param network: the road network.
     :param lateral_acceleration: comfortable in curves [m/s^2]
-    :param default_speed: where there is no speed limit [m/s]
     :raises InputError: if no lanelet is for cars or bicycles, or there are too many kilometres
         of them.
     """
 
-    def __init__(self, network: RoadNetwork, lateral_acceleration: float = 2.0,
-                 default_speed: float = 13.9) -> None:
+    def __init__(self, network: RoadNetwork, lateral_acceleration: float = 2.0) -> None:
         self.network = network
         self.ids: tuple[int, ...] = tuple(i for i in network.lanelet_ids if network.is_drivable(i))
         if not self.ids:
@@ -106,7 +108,6 @@ class LaneGraph:
         self.index: dict[int, int] = {lanelet: i for i, lanelet in enumerate(self.ids)}
         self._tabulate(network)
         self._connect(network)
-        self._default_speed = default_speed
         self.limit: FloatArray = np.zeros(len(self.ids))
         self.time: FloatArray = np.zeros(len(self.x))
         self.lateral_acceleration = lateral_acceleration
@@ -114,7 +115,7 @@ class LaneGraph:
         # The speed that the curve alone allows; a driver's factor scales only the speed limit.
         self.curve_speed: FloatArray = np.maximum(curve, 2.0)
         self._slow_at_kinks(lateral_acceleration)
-        self.read_speed_limits(network)
+        self.read_speed_limits(network.lanelet_network)
         self.table = LaneTable(
             self.first, self.count, self.length, self.step, self.limit, self.left, self.right,
             self.successors, self.predecessors, point_records(
@@ -123,10 +124,10 @@ class LaneGraph:
     def __len__(self) -> int:
         return len(self.ids)
 
-    def read_speed_limits(self, network: RoadNetwork) -> None:
-        """Read the speed limits of a network with the same lanelets [m/s]."""
-        limits = [network.speed_limit(i) for i in self.ids]
-        self.limit[:] = [self._default_speed if limit is None else limit for limit in limits]
+    def read_speed_limits(self, roads: LaneletNetwork) -> None:
+        """Read the speed limits of roads with the same lanelets [m/s]."""
+        lanelets = [roads.find_lanelet_by_id(i) for i in self.ids]
+        self.limit[:] = [speed_limit(x, roads) or _usual_speed(x.lanelet_type) for x in lanelets]
         for lane, (first, count) in enumerate(zip(self.first, self.count, strict=True)):
             pace = 1.0 / np.minimum(self.curve_speed[first:first + count], self.limit[lane])
             self.time[first + 1:first + count] = np.cumsum(
@@ -270,6 +271,13 @@ class LaneGraph:
         """Return the angle by which a lane turns, positive to the left [rad]."""
         first = int(self.first[lane])
         return float(self.yaw[first + int(self.count[lane]) - 1] - self.yaw[first])
+
+
+def _usual_speed(types: Set[LaneletType]) -> float:
+    """Return the speed on a lane of some types that has no speed limit [m/s]."""
+    if types & MOTORWAYS:
+        return MOTORWAY_SPEED
+    return COUNTRY_SPEED if LaneletType.COUNTRY in types else TOWN_SPEED
 
 
 def smooth(values: FloatArray, width: float) -> FloatArray:

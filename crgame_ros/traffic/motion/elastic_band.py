@@ -27,29 +27,18 @@ TOLERANCE = 0.02
 REACH = 7.0
 
 
-class Bands(NamedTuple):
+class Band(NamedTuple):
     """
-    The references of L lanes on a grid of S nodes.
+    The reference of a lane on a grid of S nodes.
 
-    :param d: (L, S) offset of a vehicle's centre to the left of the centre line [m]
-    :param slope: (L, S) d'
-    :param curvature: (L, S) d'', to be added to the lane's own [1/m]
-    :param blocked_lane: (B,) lanes that are blocked
-    :param blocked_s: (B,) arc length of the near edge of the blockage, which agents behind it
-        treat as the rear of a standing leader; sorted by lane, then along it [m]
+    :param d: (S,) offset of a vehicle's centre to the left of the centre line [m]
+    :param curvature: (S,) d'', to be added to the lane's own [1/m]
+    :param blocked: arc lengths, in order, of the near edges of what blocks the lane [m]
     """
 
     d: Array
-    slope: Array
     curvature: Array
-    blocked_lane: NDArray[np.intp]
-    blocked_s: Array
-
-    def blocked_from(self) -> Array:
-        """Return the first blockage of each lane, (L,); inf where it is free [m]."""
-        result = np.full(len(self.d), np.inf)
-        np.minimum.at(result, self.blocked_lane, self.blocked_s)
-        return result
+    blocked: list[float]
 
 
 class ElasticBand:
@@ -105,43 +94,40 @@ class ElasticBand:
         self._band_time = band_time
         self._min_band_length = min_band_length
         self._max_curvature = max_curvature
-        self._known: dict[int, tuple[bytes, Array, list[float]]] = {}
+        self._known: dict[bytes, Band] = {}
+        self._before: dict[bytes, Band] = {}
 
-    def relax(self, left: Array, right: Array, speed: Array, obstacles: Obstacles) -> Bands:
+    def begin_plan(self) -> None:
+        """Begin to ask for the bands of all lanes: those not asked for since are forgotten."""
+        self._before, self._known = self._known, {}
+
+    def relax(self, left: Array, right: Array, speed: float, obstacles: Obstacles) -> Band:
         """
-        Find the references of L lanes; only those with obstacles in the way cost time.
+        Find the reference of a lane; one of the present or the last plan costs no time.
 
         Just outside both ends the offset is 0, so that it continues into the next lane: obstacles
         nearer to an end than a swerve is long need a chain of lanes as one.
 
-        :param left: (L, S) room to the left of the centre line at s = 0, step, ...: half the
-            lane and what may be borrowed of its neighbour; 0 beyond the end of the lane [m]
-        :param right: (L, S) to the right [m]
-        :param speed: (L,) at which swerves are comfortable [m/s]
-        :param obstacles: all of them, of any lane
+        :param left: (S,) room to the left of the centre line at s = 0, step, ...: half the
+            lane and what may be borrowed of its neighbour [m]
+        :param right: (S,) to the right [m]
+        :param speed: at which swerves are comfortable [m/s]
+        :param obstacles: all that stand in the lane.
         """
-        d = np.zeros_like(left)
-        lanes: list[int] = []
-        places: list[float] = []
-        for lane in np.unique(obstacles.lane[self._rules.in_the_way(obstacles)]).tolist():
-            here = obstacles.select(obstacles.lane == lane)
-            key = b''.join(column.tobytes()
-                           for column in (left[lane], right[lane], speed[lane], *here))
-            known = self._known.get(lane)
-            if known is None or known[0] != key:
-                known = (key, *self._relax_lane(left[lane], right[lane], float(speed[lane]), here))
-                self._known[lane] = known
-            d[lane] = known[1]
-            lanes.extend([lane] * len(known[2]))
-            places.extend(known[2])
-        wide = np.pad(d, ((0, 0), (1, 1)))
-        return Bands(d, (wide[:, 2:] - wide[:, :-2]) / (2.0 * self.step),
-                     (wide[:, 2:] - 2.0 * d + wide[:, :-2]) / self.step ** 2,
-                     np.array(lanes, dtype=np.intp), np.array(places, dtype=np.float64))
+        key = np.concatenate(([len(left), speed], left, right, *obstacles)).tobytes()
+        band = self._known.get(key) or self._before.get(key)
+        if band is None:
+            d, blocked = np.zeros(len(left)), list[float]()
+            if self._rules.in_the_way(obstacles).any():
+                d, blocked = self._relax(left, right, speed, obstacles)
+            wide = np.pad(d, 1)
+            band = Band(d, (wide[2:] - 2.0 * d + wide[:-2]) / self.step ** 2, blocked)
+        self._known[key] = band
+        return band
 
-    def _relax_lane(self, left: Array, right: Array, speed: float, obstacles: Obstacles,
-                    for_wide: bool = True) -> tuple[Array, list[float]]:
-        """Return the offsets of one lane and where it is blocked."""
+    def _relax(self, left: Array, right: Array, speed: float, obstacles: Obstacles,
+               for_wide: bool = True) -> tuple[Array, list[float]]:
+        """Return the offsets of a lane and where it is blocked."""
         passages: list[Passage] = []
         blocked: list[float] = []
         end = self.step * (len(left) - 1)
@@ -160,7 +146,7 @@ class ElasticBand:
                 return d, sorted(blocked)
             if for_wide and self._rules.wide_half_width > self._rules.half_width:
                 # A band that is too sharp for the widest vehicles may suit the others.
-                return self._relax_lane(left, right, speed, obstacles, False)
+                return self._relax(left, right, speed, obstacles, False)
             nearest = min(passages, key=lambda passage: max(
                 passage.first - worst, worst - passage.first - len(passage.low), 0))
             passages.remove(nearest)

@@ -21,16 +21,14 @@ EQUAL = 1e-9
 
 class Obstacles(NamedTuple):
     """
-    Standing obstacles in the frames of lanes, as boxes along the lane.
+    Standing obstacles in the frame of a lane, as boxes along it.
 
-    :param lane: (M,) number of the lane
     :param s: (M,) centre along the lane [m]
     :param d: (M,) centre to the left of its centre line [m]
     :param half_length: (M,) along the lane [m]
     :param half_width: (M,) across [m]
     """
 
-    lane: NDArray[np.intp]
     s: Array
     d: Array
     half_length: Array
@@ -38,8 +36,7 @@ class Obstacles(NamedTuple):
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> 'Obstacles':
         """Return some of them."""
-        return Obstacles(self.lane[chosen], self.s[chosen], self.d[chosen],
-                         self.half_length[chosen], self.half_width[chosen])
+        return Obstacles._make(column[chosen] for column in self)
 
 
 @dataclass(frozen=True)

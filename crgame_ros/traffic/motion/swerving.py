@@ -70,6 +70,7 @@ class Swerving:
         self.reference[:] = 0.0
         self.curvature[:] = 0.0
         self.speed[:] = np.inf
+        self._band.begin_plan()
         planned: set[int] = set()
         for lane in np.unique(standing.lane).tolist():
             if lane not in planned:
@@ -85,9 +86,7 @@ class Swerving:
         of = np.array(chain)[at]
         half = graph.half_width[graph.rows(of, grid - starts[at])]
         obstacles = _along(chain, starts, standing)
-        bands = self._band.relax(half[None, :], half[None, :],
-                                 graph.limit[[lane]], obstacles)
-        d, curvature = bands.d[0], bands.curvature[0]
+        d, curvature, _ = self._band.relax(half, half, float(graph.limit[lane]), obstacles)
         cut = self._lateral_acceleration / cutting_speed(d, step, obstacles)**2
         for i, begin in zip(chain, starts, strict=False):
             if i not in planned:
@@ -130,7 +129,6 @@ def _along(chain: list[int], starts: FloatArray, standing: Entries) -> Obstacles
     number: IntArray = np.repeat(np.arange(len(chain)), [len(p) for p in parts])
     row = np.concatenate(parts)
     return Obstacles(
-        np.zeros(len(row), dtype=np.intp),
         0.5 * (standing.rear[row] + standing.front[row]) + starts[number],
         0.5 * (standing.low[row] + standing.high[row]),
         0.5 * (standing.front[row] - standing.rear[row]),
