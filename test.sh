@@ -10,7 +10,7 @@ usage='Build with colcon and run the tests.
   ./test.sh test/driver -k ramp   some tests, by arguments of pytest
 
 The last line is the closing line of pytest.'
-tier=default
+tier=
 case ${1:-} in
     --help | -h)
         printf '%s\n' "$usage"
@@ -66,7 +66,7 @@ run_tests() {
 cores=$(getconf _NPROCESSORS_ONLN)
 workers=(-n "$((cores < 4 ? cores : 4))" --dist=loadgroup --no-loadscope-reorder)
 if (($# > 0)); then
-    run_tests -v "$@"
+    run_tests -v ${tier:+"--tier=$tier"} "$@"
 elif [[ $tier == all ]]; then
     code=0
     measured=(--cov=crgame_ros --cov-branch)
@@ -79,5 +79,5 @@ elif [[ $tier == all ]]; then
     run_tests -v --tier=all -m clock || code=$?
     exit "$code"
 else
-    run_tests -v --tier="$tier" "${workers[@]}"
+    run_tests -v --tier="${tier:-default}" "${workers[@]}"
 fi

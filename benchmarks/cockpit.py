@@ -48,8 +48,10 @@ def script_run(folder: Path, scenario: Path, seconds: float) -> None:
             time.sleep(seconds)
             stats = driver.execute_script(
                 'return [crgame.world.stats.frames, Array.from(crgame.world.stats.frame_ms)]')
-            count = min(stats[0] - before, len(stats[1]))
-            times = [value for value in stats[1] if value > 0.0][-count:]
+            # A ring of the latest frames.
+            kept = len(stats[1])
+            times = [stats[1][frame % kept]
+                     for frame in range(max(before, stats[0] - kept), stats[0])]
             report(f'script a frame, {view} [ms]', times, '<= 8')
             print(f'{"":34} {(stats[0] - before) / seconds:.1f} frames/s; {scenario.stem}: '
                   f'{size[0]} lanelets, {size[1]} objects', flush=True)

@@ -47,7 +47,7 @@ def measure(plan: EvaluationPlan, workers: int) -> None:
     def told(tally: EvaluationTally, _cell: object, _row: object) -> None:
         nonlocal begun_s
         begun_s = begun_s or time.perf_counter()
-        if tally.done % 50 == 0:
+        if not memory or tally.done % 50 == 0:
             memory.append(memory_mb())
 
     with tempfile.TemporaryDirectory() as folder:

@@ -197,12 +197,9 @@ def _recording(text: str) -> Path:
 def _trigger(text: str) -> tuple[str, float]:
     name, _, seconds = text.rpartition('@')
     try:
-        time_s = float(seconds)
+        return name, float(seconds)
     except ValueError:
-        time_s = -1.0
-    if not name or not 0.0 <= time_s < 1e9:
-        raise InputError(f'is "{text[:60]}"', '--trigger', 'give NAME@SECONDS')
-    return name, time_s
+        raise InputError(f'is "{text[:60]}"', '--trigger', 'give NAME@SECONDS') from None
 
 
 def _offline(values: argparse.Namespace) -> int:

@@ -11,12 +11,12 @@ FOLDERS is the order: a folder imports from those above it in the list only. A t
 the sentence beside each folder is its own docstring.
 """
 
-import argparse
 import ast
 from collections import Counter
 from pathlib import Path
-import re
 import sys
+
+from written import between, main_of
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / 'crgame_ros'
@@ -38,7 +38,6 @@ FOLDERS = (
     'study/data', 'cockpit', 'cockpit/runs', 'study/desk', 'gym', 'ros', 'nodes/sim',
     'nodes/cockpit', 'nodes/markers', 'nodes', 'launcher', 'submission', 'verdict', 'search',
     'study/conduct', 'reproduction', 'python_interface', HIGHEST)
-BEGIN, END = '<!-- folders: begin -->', '<!-- folders: end -->'
 # Of the picture [px].
 CELL, NAMES, TOP = 22, 150, 120
 
@@ -142,24 +141,12 @@ def picture(counts: Counter[tuple[str, str]]) -> str:
     return '\n'.join([*parts, '</svg>', ''])
 
 
-def main() -> int:
-    """Write or check both files."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--check', action='store_true')
-    check = parser.parse_args().check
+def files() -> dict[Path, str]:
+    """Return the document with its list, and the picture."""
     counts = Counter({pair: len(found) for pair, found in imports().items()})
-    text = DOCUMENT.read_text(encoding='utf-8')
-    listed = re.sub(f'{BEGIN}.*{END}', lambda _: f'{BEGIN}\n{table(counts)}\n{END}', text,
-                    flags=re.DOTALL)
-    for file, wanted in ((DOCUMENT, listed), (PICTURE, picture(counts))):
-        if check and (not file.exists() or file.read_text(encoding='utf-8') != wanted):
-            print(f'{file.relative_to(ROOT)} is out of date: run scripts/architecture.py')
-            return 1
-        if not check:
-            file.write_text(wanted, encoding='utf-8')
-    return 0
+    return {DOCUMENT: between(DOCUMENT.read_text(encoding='utf-8'), 'folders', table(counts)),
+            PICTURE: picture(counts)}
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(main_of(__doc__, files))

@@ -14,7 +14,6 @@ from collections.abc import Iterator
 import json
 import math
 from pathlib import Path
-import re
 import statistics
 import subprocess
 import sys
@@ -33,11 +32,11 @@ from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.simulation.observer import ObservedRun
 from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
 import numpy as np
+from written import between
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / 'docs' / 'criticality.md'
 PACKAGE = 'commonroad-crime==0.4.5'
-MARKS = '<!-- crime: begin -->', '<!-- crime: end -->'
 # At most so many pairs and steps of a scenario are used, spread evenly.
 MOST = 30
 # Values this near count as the same: half a length of a car is 2 m at least.
@@ -83,7 +82,13 @@ def measured(loaded: LoadedScenario, moving: list[DynamicObstacle]) -> dict[str,
         crossings += [{'ego': moving[each.first].obstacle_id, 'step': 0,
                        'other': moving[each.second].obstacle_id, 'pet': each.pet_s}
                       for each in criticality.new_crossings]
-    return {'pairs': pairs[::max(1, len(pairs) // MOST)][:MOST], 'crossings': crossings[:MOST]}
+    return {'pairs': spread(pairs), 'crossings': spread(crossings)}
+
+
+def spread(items: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return `MOST` of the items at most, spread evenly."""
+    places = np.linspace(0, len(items) - 1, min(MOST, len(items))).round().astype(int)
+    return [items[place] for place in places]
 
 
 def crime_python(environment: Path) -> Path:
@@ -147,10 +152,7 @@ def main() -> None:
     if not values.write:
         print(table)
         return
-    begin, end = MARKS
-    text = re.sub(f'{begin}.*{end}', lambda _: f'{begin}\n{table}\n{end}',
-                  PAGE.read_text(encoding='utf-8'), flags=re.DOTALL)
-    PAGE.write_text(text, encoding='utf-8')
+    PAGE.write_text(between(PAGE.read_text(encoding='utf-8'), 'crime', table), encoding='utf-8')
 
 
 if __name__ == '__main__':

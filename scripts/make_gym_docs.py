@@ -7,9 +7,7 @@ Write the observations and rewards of environments into docs/gym.md.
     python3 scripts/make_gym_docs.py --check    say whether they are up to date, change nothing
 """
 
-import argparse
 from pathlib import Path
-import re
 import sys
 
 from crgame_ros.gym.reward import TERMS, USUAL_REWARD
@@ -19,6 +17,7 @@ from crgame_ros.policy.observation_spec import (
     ROUTE_COLUMNS,
     STATE_COLUMNS,
 )
+from written import between, main_of
 
 DOCUMENT = Path(__file__).resolve().parent.parent / 'docs' / 'gym.md'
 
@@ -51,27 +50,13 @@ def terms() -> str:
     return '\n'.join(lines)
 
 
-def main() -> int:
-    """Write the document, or check it."""
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--check', action='store_true', help='change nothing')
-    values = parser.parse_args()
-    text = wanted = DOCUMENT.read_text(encoding='utf-8')
+def files() -> dict[Path, str]:
+    """Return the document with its tables."""
+    text = DOCUMENT.read_text(encoding='utf-8')
     for name, made in (('observations', observations()), ('terms', terms())):
-        begin, end = f'<!-- {name}: begin -->', f'<!-- {name}: end -->'
-        wanted, found = re.subn(f'{begin}.*?{end}', lambda _, a=begin, b=made, c=end:
-                                f'{a}\n{b}\n{c}', wanted, flags=re.DOTALL)
-        if found != 1:
-            print(f'{DOCUMENT}: the comments "{begin}" and "{end}" are missing')
-            return 1
-    if wanted != text and values.check:
-        print(f'{DOCUMENT} is out of date: run scripts/make_gym_docs.py')
-        return 1
-    if wanted != text:
-        DOCUMENT.write_text(wanted, encoding='utf-8')
-    return 0
+        text = between(text, name, made)
+    return {DOCUMENT: text}
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(main_of(__doc__, files))

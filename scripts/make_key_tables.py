@@ -10,7 +10,6 @@ A table in another page stands between two comments: <!-- keys: game.object_spec
 <!-- keys: end -->.
 """
 
-import argparse
 from collections.abc import Iterator
 from dataclasses import is_dataclass, MISSING
 import importlib
@@ -36,6 +35,7 @@ from crgame_ros.schema.file_kinds import FILE_KINDS
 from crgame_ros.schema.marks import Folder, Keyed, Meaning, Numbered, OnlyWith, Special
 from crgame_ros.schema.model_options import options_of
 from crgame_ros.schema.writing import write
+from written import main_of
 
 DOCS = Path(__file__).resolve().parent.parent / 'docs'
 REFERENCE = DOCS / 'keys.md'
@@ -183,24 +183,5 @@ def pages() -> dict[Path, str]:
     return found
 
 
-def main() -> int:
-    """
-    Write the tables, or check them.
-
-    :return: exit code: 0 if all is written or up to date.
-    """
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--check', action='store_true')
-    check = parser.parse_args().check
-    old = [page for page, text in pages().items()
-           if not page.exists() or page.read_text(encoding='utf-8') != text]
-    for page in old:
-        print(f'{page}: {"old: run scripts/make_key_tables.py" if check else "written"}')
-        if not check:
-            page.write_text(pages()[page], encoding='utf-8')
-    return 1 if check and old else 0
-
-
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(main_of(__doc__, pages))

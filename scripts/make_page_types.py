@@ -7,7 +7,6 @@ Write the types of the pages' messages in TypeScript from the classes that read 
     python3 scripts/make_page_types.py --check    say whether they are up to date, change nothing
 """
 
-import argparse
 import json
 from pathlib import Path
 import re
@@ -23,6 +22,7 @@ from crgame_ros.study.desk.messages import (  # noqa: E402
     ParticipantMessage,
 )
 from pydantic import TypeAdapter  # noqa: E402
+from written import main_of  # noqa: E402
 
 FILES = {
     'page/cockpit/js/page_messages.d.ts': {'PageMessage': PageMessage},
@@ -103,25 +103,10 @@ def types_of(unions: dict[str, Any]) -> str:
     return HEAD + ''.join(declaration(name, known[name]) for name in sorted(known)) + ends
 
 
-def main() -> int:
-    """Write the files, or check them."""
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--check', action='store_true', help='change nothing')
-    check = parser.parse_args().check
-    code = 0
-    for name, unions in FILES.items():
-        path, text = ROOT / name, types_of(unions)
-        if path.is_file() and path.read_text(encoding='utf-8') == text:
-            continue
-        if check:
-            print(f'{name} is out of date: run scripts/make_page_types.py')
-            code = 1
-        else:
-            path.write_text(text, encoding='utf-8')
-            print(path)
-    return code
+def files() -> dict[Path, str]:
+    """Return the files' texts."""
+    return {ROOT / name: types_of(unions) for name, unions in FILES.items()}
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(main_of(__doc__, files))

@@ -12,15 +12,13 @@ They stand between two comments: <!-- columns: begin --> and <!-- columns: end -
 <!-- columns of staircases: begin --> and so on.
 """
 
-import argparse
-from collections.abc import Callable
 from pathlib import Path
-import re
 import sys
 
 from crgame_ros.analysis.tables.column import Column, TableDeclaration
 from crgame_ros.analysis.tables.run_tables import TABLES
 from crgame_ros.study.data.session_tables import STAIRCASES
+from written import between, main_of
 
 DOCS = Path(__file__).resolve().parent.parent / 'docs'
 
@@ -52,38 +50,13 @@ def columns_of_staircases() -> str:
     return table(STAIRCASES).partition('\n\n')[2]
 
 
-PARTS: tuple[tuple[str, str, Callable[[], str]], ...] = (
-    ('tables.md', 'columns', columns_of_runs),
-    ('studies.md', 'columns of staircases', columns_of_staircases))
-
-
-def written(document: Path, words: str, columns: str, check: bool) -> bool:
-    """Write a part of a document, or check it; return whether it is as it should be."""
-    text = document.read_text(encoding='utf-8')
-    wanted, found = re.subn(
-        f'(<!-- {words}: begin -->\n).*?(<!-- {words}: end -->)',
-        lambda match: f'{match[1]}\n{columns}\n{match[2]}', text, flags=re.DOTALL)
-    if found != 1:
-        print(f'{document}: the comments "{words}: begin" and "{words}: end" are missing')
-        return False
-    if wanted == text:
-        return True
-    if check:
-        print(f'{document} is out of date: run scripts/make_table_docs.py')
-        return False
-    document.write_text(wanted, encoding='utf-8')
-    return True
-
-
-def main() -> int:
-    """Write the documents, or check them."""
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--check', action='store_true', help='change nothing')
-    values = parser.parse_args()
-    done = [written(DOCS / name, words, columns(), values.check) for name, words, columns in PARTS]
-    return int(not all(done))
+def files() -> dict[Path, str]:
+    """Return the documents with their tables."""
+    return {DOCS / file: between((DOCS / file).read_text(encoding='utf-8'), name, f'\n{columns}')
+            for file, name, columns in (
+                ('tables.md', 'columns', columns_of_runs()),
+                ('studies.md', 'columns of staircases', columns_of_staircases()))}
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(main_of(__doc__, files))

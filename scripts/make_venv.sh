@@ -18,7 +18,9 @@ fail() {
     exit 1
 }
 
-trap 'say "stopped; the next start goes on from here"; exit 130' INT TERM HUP
+pages=
+trap '[[ -z $pages ]] || kill "$pages" 2>/dev/null || true
+    say "stopped; the next start goes on from here"; exit 130' INT TERM HUP
 # uv locks .lock itself.
 if ! { mkdir -p "$venv" && touch "$venv/COLCON_IGNORE" && exec 9>"$venv/making.lock"; } 2>/dev/null; then
     fail "cannot write to $venv: copy the checkout to a folder of your own"
@@ -79,12 +81,14 @@ hardlink --content --quiet --minimum-size 64KiB "$venv" 2>/dev/null || true
 ln -sf ../../crgame "$venv/bin/crgame"
 ln -sf "$uv" "$venv/bin/uv"
 
-(PYTHONPATH=$root "$venv/bin/python" -m crgame_ros.cli page-libraries) >"$venv/pages.log" 2>&1 &
+# Without the lock: what is left of a stopped start must not hold up the next.
+PYTHONPATH=$root "$venv/bin/python" -m crgame_ros.cli page-libraries >"$venv/pages.log" 2>&1 9>&- &
 pages=$!
 say 'compiling polygon3 for the planners that need it: up to half a minute'
 planners=$root/requirements-planners.txt
 # The others declare Python < 3.12, though they work on it.
-if install --quiet "$(grep '^polygon3' "$planners")" 2>"$venv/polygon3.log"; then
+# In a shell of its own: what the trap says is not for the file.
+if (install --quiet "$(grep '^polygon3' "$planners")") 2>"$venv/polygon3.log"; then
     grep -v '^polygon3' "$planners" >"$venv/planners.txt"
     install --quiet --python-version 3.11 -r "$venv/planners.txt"
 else

@@ -15,10 +15,11 @@ from scenario_maps import (
     Problem,
     RoadMap,
     ScenarioFile,
+    STREET_WIDTH,
+    two_way,
 )
 from scenario_xml import TIME_STEP_S
 
-WIDTH = 3.5
 LENGTH = 600.0
 CROSSING_AT = 170.0
 SPEED = 12.5
@@ -35,18 +36,9 @@ def crossing() -> ScenarioFile:
     """Build a straight street with a crossing, a pedestrian beside it and a car far ahead."""
     roads = RoadMap()
     curve = clothoids((0.0, 0.0, 0.0), [(LENGTH, 0.0)], 5.0)
-    cut = curve.index_at(CROSSING_AT)
-    for number, (first, last) in enumerate(((0, cut), (cut, len(curve) - 1)), start=1):
-        part = curve.part(first, last)
-        roads.add(10 * number + 1, part, (0.0, -WIDTH), ('dashed', 'curb'), 'urban')
-        roads.add(10 * number + 2, part, (WIDTH, 0.0), ('dashed', 'curb'), 'urban', reverse=True)
-        roads.facing(10 * number + 1, 10 * number + 2)
-    roads.chain(11, 21)
-    roads.chain(22, 12)
-    roads.speed_limit(50 * KMH, 11, 21)
-    roads.speed_limit(50 * KMH, 22, 12)
-    walk = clothoids((CROSSING_AT, -WIDTH, 0.5 * math.pi), [(2.0 * WIDTH, 0.0)], 1.0)
-    roads.add(31, walk, WIDTH, ('dashed', 'dashed'), 'crosswalk').users = ('pedestrian',)
+    two_way(roads, curve, (CROSSING_AT,), STREET_WIDTH, 50 * KMH, 'urban')
+    walk = clothoids((CROSSING_AT, -STREET_WIDTH, 0.5 * math.pi), [(2.0 * STREET_WIDTH, 0.0)], 1.0)
+    roads.add(31, walk, STREET_WIDTH, ('dashed', 'dashed'), 'crosswalk').users = ('pedestrian',)
     leader = Obstacle(OBSTACLE_ID, 'car', (4.5, 1.8), _driving(LEADER_AT, SPEED))
     walker = Obstacle(OBSTACLE_ID + 1, 'pedestrian', (0.35,), _walking())
     problem = Problem(PLANNING_PROBLEM_ID, roads.lanelets[11].pose_at(45.0), SPEED, (21,))
@@ -61,7 +53,7 @@ def _times() -> NDArray[np.float64]:
 def _driving(start: float, speed: float) -> NDArray[np.float64]:
     """Drive along the right lane; states as in `Obstacle`."""
     times = _times()
-    return np.stack((start + speed * times, np.full_like(times, -0.5 * WIDTH),
+    return np.stack((start + speed * times, np.full_like(times, -0.5 * STREET_WIDTH),
                      np.zeros_like(times), np.full_like(times, speed)), axis=-1)
 
 

@@ -4,7 +4,7 @@
 
 import math
 
-from scenario_curves import clothoids, Curve
+from scenario_curves import clothoids
 from scenario_maps import (
     carriageway,
     KMH,
@@ -12,25 +12,17 @@ from scenario_maps import (
     Problem,
     RoadMap,
     ScenarioFile,
+    STREET_WIDTH,
+    street_with_parking,
+    two_way,
 )
 
-STREET_WIDTH = 3.5
-PARKING_WIDTH = 2.3
 ROAD_WIDTH = 3.75
 
 
 def occluded_pedestrian() -> ScenarioFile:
     """Build a straight street with a parking lane on the AV's side."""
-    roads = RoadMap()
-    curve = clothoids((-60.0, 0.0, 0.0), [(480.0, 0.0)], 5.0)
-    _two_way(roads, curve, (240.0,), STREET_WIDTH, 50 * KMH, 'urban')
-    for number, (first, last) in enumerate(((0, 48), (48, 96)), start=1):
-        roads.add(10 * number + 3, curve.part(first, last),
-                  (-STREET_WIDTH, -STREET_WIDTH - PARKING_WIDTH), ('no_marking', 'curb'),
-                  'urban', 'parking')
-        roads.lanelets[10 * number + 1].markings = ('dashed', 'no_marking')
-        roads.beside(10 * number + 1, 10 * number + 3)
-    roads.chain(13, 23)
+    roads = street_with_parking(clothoids((-60.0, 0.0, 0.0), [(480.0, 0.0)], 5.0), 240.0)
     problem = Problem(PLANNING_PROBLEM_ID, roads.lanelets[11].pose_at(45.0), 11.0, (21,))
     return ScenarioFile('ZAM_OccludedPedestrian-1_1_T-1', roads, (problem,),
                         ('urban', 'oncoming_traffic', 'two_lane', 'critical', 'simulated'))
@@ -69,7 +61,7 @@ def blocked_lane() -> ScenarioFile:
     roads = RoadMap()
     curve = clothoids((-250.0, 0.0, 0.0), [
         (200.0, 0.0), (60.0, 1 / 300), (120.0, 1 / 300), (60.0, 0.0), (310.0, 0.0)], 1.9)
-    _two_way(roads, curve, (375.0,), ROAD_WIDTH, 50 * KMH, 'urban')
+    two_way(roads, curve, (375.0,), ROAD_WIDTH, 50 * KMH, 'urban')
     problem = Problem(PLANNING_PROBLEM_ID, roads.lanelets[22].pose_at(40.0), 12.0, (12,))
     return ScenarioFile('ZAM_BlockedLane-1_1_T-1', roads, (problem,),
                         ('urban', 'oncoming_traffic', 'two_lane', 'simulated'))
@@ -81,31 +73,7 @@ def fog() -> ScenarioFile:
     curve = clothoids((-100.0, 0.0, 0.0), [
         (140.0, 0.0), (60.0, 1 / 250), (80.0, 1 / 250), (120.0, -1 / 250), (80.0, -1 / 250),
         (60.0, 0.0), (210.0, 0.0)], 1.9)
-    _two_way(roads, curve, (250.0, 500.0), STREET_WIDTH, 80 * KMH, 'country')
+    two_way(roads, curve, (250.0, 500.0), STREET_WIDTH, 80 * KMH, 'country')
     problem = Problem(PLANNING_PROBLEM_ID, roads.lanelets[11].pose_at(45.0), 12.0, (31,))
     return ScenarioFile('ZAM_Fog-1_1_T-1', roads, (problem,),
                         ('rural', 'two_lane', 'oncoming_traffic', 'simulated'))
-
-
-def _two_way(roads: RoadMap, curve: Curve, cuts: tuple[float, ...], width: float, limit: float,
-             *types: str) -> None:
-    """
-    Add one lane in each direction: along the curve lanelets 11, 21, …, against it …, 22, 12.
-
-    :param cuts: arc lengths at which one segment ends and the next begins [m].
-    :param width: of each lane [m]
-    :param limit: speed limit [m/s].
-    """
-    indices = [0, *(curve.index_at(cut) for cut in cuts), len(curve) - 1]
-    ids = range(1, len(indices))
-    for number, first, last in zip(ids, indices, indices[1:], strict=False):
-        part = curve.part(first, last)
-        roads.add(10 * number + 1, part, (0.0, -width), ('dashed', 'curb'), *types)
-        roads.add(10 * number + 2, part, (width, 0.0), ('dashed', 'curb'), *types, reverse=True)
-        roads.facing(10 * number + 1, 10 * number + 2)
-    along = [10 * number + 1 for number in ids]
-    against = [10 * number + 2 for number in reversed(ids)]
-    roads.chain(*along)
-    roads.chain(*against)
-    roads.speed_limit(limit, *along)
-    roads.speed_limit(limit, *against)

@@ -14,6 +14,9 @@ PLANNING_PROBLEM_ID = 100
 OBSTACLE_ID = 200
 SIGN_ID = 300
 INTERSECTION_ID = 400
+# Of the lanes of streets [m].
+STREET_WIDTH = 3.5
+PARKING_WIDTH = 2.3
 
 
 @dataclass
@@ -217,3 +220,46 @@ def carriageway(
             if lane:
                 roads.beside(id_, id_ - 1)
         roads.speed_limit(limit, *ids)
+
+
+def two_way(roads: RoadMap, curve: Curve, cuts: Sequence[float], width: float, limit: float,
+            *types: str) -> None:
+    """
+    Add one lane in each direction: along the curve lanelets 11, 21, …, against it …, 22, 12.
+
+    :param cuts: arc lengths at which one segment ends and the next begins [m].
+    :param width: of each lane [m]
+    :param limit: speed limit [m/s].
+    """
+    indices = [0, *(curve.index_at(cut) for cut in cuts), len(curve) - 1]
+    ids = range(1, len(indices))
+    for number, first, last in zip(ids, indices, indices[1:], strict=False):
+        part = curve.part(first, last)
+        roads.add(10 * number + 1, part, (0.0, -width), ('dashed', 'curb'), *types)
+        roads.add(10 * number + 2, part, (width, 0.0), ('dashed', 'curb'), *types, reverse=True)
+        roads.facing(10 * number + 1, 10 * number + 2)
+    along = [10 * number + 1 for number in ids]
+    against = [10 * number + 2 for number in reversed(ids)]
+    roads.chain(*along)
+    roads.chain(*against)
+    roads.speed_limit(limit, *along)
+    roads.speed_limit(limit, *against)
+
+
+def street_with_parking(curve: Curve, cut: float) -> RoadMap:
+    """
+    Build a street of one lane in each direction, with a parking lane 13, 23 beside 11, 21.
+
+    :param cut: arc length at which its first half ends [m]
+    """
+    roads = RoadMap()
+    two_way(roads, curve, (cut,), STREET_WIDTH, 50 * KMH, 'urban')
+    middle = curve.index_at(cut)
+    for number, (first, last) in enumerate(((0, middle), (middle, len(curve) - 1)), start=1):
+        roads.add(10 * number + 3, curve.part(first, last),
+                  (-STREET_WIDTH, -STREET_WIDTH - PARKING_WIDTH), ('no_marking', 'curb'),
+                  'urban', 'parking')
+        roads.lanelets[10 * number + 1].markings = ('dashed', 'no_marking')
+        roads.beside(10 * number + 1, 10 * number + 3)
+    roads.chain(13, 23)
+    return roads

@@ -12,14 +12,16 @@ from scenario_maps import (
     KMH,
     Obstacle,
     OBSTACLE_ID,
+    PARKING_WIDTH,
     PLANNING_PROBLEM_ID,
     Problem,
     RoadMap,
     ScenarioFile,
+    STREET_WIDTH,
+    street_with_parking,
 )
 from scenario_xml import TIME_STEP_S
 
-WIDTH = 3.5
 EAST, NORTH, WEST, SOUTH = 0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi
 STRAIGHT = ((330.0, 0.0),)
 
@@ -30,8 +32,8 @@ def t_junction() -> ScenarioFile:
     side = ((20.0, 0.0), (25.0, 1 / 60), (40.0, 1 / 60), (25.0, 0.0), (80.0, 0.0))
     junction(roads, (Arm(WEST, STRAIGHT, 50 * KMH),
                      Arm(SOUTH, side, 50 * KMH, has_priority=False),
-                     Arm(EAST, STRAIGHT, 50 * KMH)), 18.0, WIDTH, 'urban')
-    problem = Problem(PLANNING_PROBLEM_ID, (-103.0, -0.5 * WIDTH, 0.0), 12.5, (32,))
+                     Arm(EAST, STRAIGHT, 50 * KMH)), 18.0, STREET_WIDTH, 'urban')
+    problem = Problem(PLANNING_PROBLEM_ID, (-103.0, -0.5 * STREET_WIDTH, 0.0), 12.5, (32,))
     return ScenarioFile('ZAM_TJunction-1_1_T-1', roads, (problem,),
                         ('urban', 'intersection', 'two_lane', 'simulated'))
 
@@ -43,8 +45,8 @@ def intersection() -> ScenarioFile:
     junction(roads, (Arm(WEST, STRAIGHT, 50 * KMH),
                      Arm(SOUTH, bent, 50 * KMH, has_priority=False),
                      Arm(EAST, STRAIGHT, 50 * KMH),
-                     Arm(NORTH, bent, 50 * KMH, has_priority=False)), 18.0, WIDTH, 'urban')
-    problem = Problem(PLANNING_PROBLEM_ID, (-113.0, -0.5 * WIDTH, 0.0), 12.5, (32,))
+                     Arm(NORTH, bent, 50 * KMH, has_priority=False)), 18.0, STREET_WIDTH, 'urban')
+    problem = Problem(PLANNING_PROBLEM_ID, (-113.0, -0.5 * STREET_WIDTH, 0.0), 12.5, (32,))
     return ScenarioFile('ZAM_Intersection-1_1_T-1', roads, (problem,),
                         ('urban', 'intersection', 'oncoming_traffic', 'turn_left', 'simulated'))
 
@@ -64,25 +66,11 @@ def roundabout_() -> ScenarioFile:
 
 def parked_cars() -> ScenarioFile:
     """Build a winding street with a parking lane, and a pedestrian between the parked cars."""
-    roads = RoadMap()
     curve = clothoids((-60.0, 0.0, 0.0), [
         (60.0, 0.0), (30.0, 1 / 150), (90.0, 1 / 150), (60.0, -1 / 150), (90.0, -1 / 150),
         (30.0, 0.0), (120.0, 0.0)], 1.5)
-    end = len(curve) - 1
-    for number, (first, last) in enumerate(((0, end // 2), (end // 2, end)), start=1):
-        part = curve.part(first, last)
-        roads.add(10 * number + 1, part, (0.0, -WIDTH), ('dashed', 'no_marking'), 'urban')
-        roads.add(10 * number + 2, part, (WIDTH, 0.0), ('dashed', 'curb'), 'urban', reverse=True)
-        roads.add(10 * number + 3, part, (-WIDTH, -WIDTH - PARKING_WIDTH),
-                  ('no_marking', 'curb'), 'urban', 'parking')
-        roads.facing(10 * number + 1, 10 * number + 2)
-        roads.beside(10 * number + 1, 10 * number + 3)
-    roads.chain(11, 21)
-    roads.chain(22, 12)
-    roads.chain(13, 23)
-    roads.speed_limit(50 * KMH, 11, 21)
-    roads.speed_limit(50 * KMH, 22, 12)
-    lanes = curve.shifted(-WIDTH - 0.5 * PARKING_WIDTH)
+    roads = street_with_parking(curve, 240.0)
+    lanes = curve.shifted(-STREET_WIDTH - 0.5 * PARKING_WIDTH)
     cars = [Obstacle(OBSTACLE_ID + number, 'parkedVehicle', (4.6, 1.8),
                      np.array([[*lanes.pose(lanes.index_at(s)), 0.0]]))
             for number, s in enumerate(PARKED_AT)]
@@ -94,7 +82,6 @@ def parked_cars() -> ScenarioFile:
                         (*cars, walker))
 
 
-PARKING_WIDTH = 2.3
 PARKED_AT = (92.0, 99.0, 106.0, 113.5, 121.0, 128.0, 142.0, 149.0, 156.5, 170.0, 177.0, 198.0,
              205.5, 212.5, 240.0, 247.0)
 CROSSING_AT = 135.0

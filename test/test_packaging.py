@@ -15,6 +15,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 import tomllib
 from zipfile import ZipFile
 
@@ -401,23 +402,41 @@ def test_a_checkout_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     assert f'cannot write to {tree.resolve()}/.venv: copy the checkout' in done.stderr
 
 
-def test_ctrl_c_while_packages_are_installed_is_one_line(tmp_path: Path) -> None:
-    """The whole group gets the signal, as from a terminal."""
+@pytest.mark.parametrize('step', ['venv', 'polygon3'])
+def test_ctrl_c_while_packages_are_installed_is_one_line(tmp_path: Path, step: str) -> None:
+    """The whole group gets the signal, as from a terminal; nothing goes on or keeps the lock."""
     tree = _copy(tmp_path, 'scripts/env.sh', 'scripts/make_venv.sh', *PINS)
     uv = tmp_path / 'programs' / 'uv'
     uv.parent.mkdir()
-    uv.write_text('#!/bin/sh\necho waiting >&2\nexec sleep 600\n')
+    begun = tmp_path / 'begun'
+    uv.write_text(f'#!/bin/sh\ncase "$*" in *{step}*) touch {begun}; exec sleep 600;; esac\n')
     uv.chmod(0o755)
+    # Loads libraries of pages beside the compiler.
+    python, loads = tree / '.venv' / 'bin' / 'python', tmp_path / 'pid'
+    python.parent.mkdir(parents=True)
+    (tree / '.venv' / 'lib' / 'python3' / 'site-packages').mkdir(parents=True)
+    python.write_text(f'#!/bin/sh\necho $$ >{loads}.new; mv {loads}.new {loads}; exec sleep 600\n')
+    python.chmod(0o755)
     with subprocess.Popen(
             [tree / 'scripts' / 'make_venv.sh', tree / '.venv', sys.executable, 'wheels', 'none'],
-            env=os.environ | {'PATH': f'{uv.parent}:{os.environ["PATH"]}'}, text=True,
-            stderr=subprocess.PIPE, start_new_session=True) as process:
-        assert process.stderr is not None
-        while 'waiting' not in process.stderr.readline():
-            pass
+            env=os.environ | {'PATH': f'{uv.parent}:{os.environ["PATH"]}', 'CRGAME_DEVELOP': ''},
+            text=True, stderr=subprocess.PIPE, start_new_session=True) as process:
+        while not begun.exists() or step == 'polygon3' and not loads.exists():
+            assert process.poll() is None
+            time.sleep(0.01)
         os.killpg(process.pid, signal.SIGINT)
-        assert process.stderr.read() == 'crgame: stopped; the next start goes on from here\n'
+        assert process.stderr is not None
+        assert process.stderr.read().endswith(
+            'crgame: stopped; the next start goes on from here\n')
     assert process.returncode == 130
+    lock = tree / '.venv' / 'making.lock'
+    assert subprocess.run(['flock', '--nonblock', lock, 'true']).returncode == 0
+    if step == 'polygon3':
+        left = Path('/proc', loads.read_text().strip(), 'cmdline')
+        until = time.monotonic() + 10.0
+        while left.exists() and left.read_bytes() and time.monotonic() < until:
+            time.sleep(0.01)
+        assert not left.exists() or not left.read_bytes()
 
 
 @pytest.mark.parametrize('ros', ['wheels', 'jazzy'])

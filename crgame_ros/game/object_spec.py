@@ -267,7 +267,8 @@ class ObjectSpec:
     :param s: station of its centre on that lanelet [m]
     :param speeds: desired speed at each way-point, linear in between [m/s]
     :param start: time since the start of the run at which it starts to move [s]; until then it
-        stands at its beginning. An object that starts at 0 moves at its speed from the beginning.
+        stands at its beginning, and one with a trajectory is absent. An object that starts at 0
+        moves at its speed from the beginning.
     :param end: its behaviour at its end; by default it stays only at the end of a path.
     :param reactive: whether it reacts to others.
     :param radius: of its circle, instead of a size [m]
@@ -284,9 +285,9 @@ class ObjectSpec:
 
     # The names that the program gives to vehicles, obstacles, traffic and events are reserved.
     id: Annotated[str, Numbered('b'), Wording(  # noqa: A003
-        r'(?!(?:(?:hv|av|o|t)[0-9]+|e_.*)$)[a-z][A-Za-z0-9_]{0,39}',
+        r'(?!(?:(?:hv|av|o|t)[0-9]+(?:_[0-9]+)?|e_.*)$)[a-z][A-Za-z0-9_]{0,39}',
         'begin with a-z, go on with letters, digits and _ (40 at most), and leave hv0, av0, o0, '
-        't0, e_… to others')]
+        'o0_2, t0, e_… to others')]
     kind: ObjectKind
     type: str = ''  # noqa: A003
     size: Annotated[tuple[float, float], Parts(('length', 'width')),

@@ -196,10 +196,19 @@ def drive(name: str, setup: Setup, latency_steps: int = 0,
     :param triggers: names of events, with their times after the start [s]
     :param say: called with each text about failing planners, and about progress.
     :param keep_messages: whether a recording of the run is wanted.
-    :raises InputError: as `run_offline`; if the latency is negative.
+    :raises InputError: as `run_offline`; if the latency is negative, or a trigger has no time or
+        names nothing of the game.
     """
     if latency_steps < 0:
         raise InputError(f'is {latency_steps}', 'latency', 'give 0 or more steps')
+    known = [item.name for item in (*setup.game.events, *setup.game.tasks)]
+    for event, time_s in triggers:
+        if event not in known:
+            raise InputError(f'there is no event "{event[:40]}"', 'triggers',
+                             f'the game has {", ".join(known) or "none"}')
+        if not 0.0 <= time_s < 1e9:
+            raise InputError(f'is {time_s} s', f'trigger {event}',
+                             'give seconds after the start, 0 or more')
     drivers, intervals_s = recorded_inputs(setup)
     steps = [(round(time_s / setup.scheduler.dt_s), event) for event, time_s in triggers]
     began_s = time.perf_counter()

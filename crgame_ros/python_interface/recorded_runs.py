@@ -47,7 +47,7 @@ class RecordedRun(Run):
     """
 
     def __init__(self, name: str, bag: Path, log: RunTrajectories) -> None:
-        super().__init__(name, bag=bag, log=log)
+        super().__init__(name, bag=bag, epoch=log.game.epoch, log=log)
         self._bag = bag
 
     def setup_against(self, planner: str) -> Setup:
@@ -162,10 +162,10 @@ def replay(run: Run | FileName, planners: PlannerLike | Sequence[PlannerLike], *
     with argument_names(), PLANNERS.giving(named.own):
         # Check every planner before the first one drives.
         setups = {name: recorded.setup_against(name) for name in named.names}
-        for name in setups:
-            PLANNERS.find(name)
         for name, setup in setups.items():
+            PLANNERS.find(name)
             named.check_object(name, len(setup.avs))
+        for name, setup in setups.items():
             began_s = time.perf_counter()
             alternative = drive_against(
                 name, setup, recorded.log, latency_steps,

@@ -16,7 +16,7 @@ from commonroad.geometry.shape import Shape as CommonRoadShape
 from crgame_ros.errors import CrgameError
 from crgame_ros.geometry.outline import outline, placed_at
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.exact_values import parts_of
+from crgame_ros.scenario.exact_values import group_outline, parts_of
 from crgame_ros.scenario.export_network import schema_errors
 from lxml import etree
 import numpy as np
@@ -233,7 +233,7 @@ def goal_position(shape: CommonRoadShape) -> str:
     """
     parts = list(parts_of(shape))
     if len({type(part) for part in parts}) > 1:
-        return ''.join(_polygon(part.shapely_object.exterior.coords[:-1])
+        return ''.join(_polygon(group_outline(part).exterior.coords[:-1])
                        if not isinstance(part, Polygon) else _commonroad_shape(part)
                        for part in parts)
     return ''.join(_commonroad_shape(part) for part in parts)

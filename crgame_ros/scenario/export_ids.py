@@ -20,12 +20,14 @@ class IdPool:
 
     def __init__(self, taken: set[int], notices: list[str]) -> None:
         self._taken = taken
+        self._last = max((0, *taken))
         self._notices = notices
 
     def keep(self, number: int, name: str) -> int:
         """Return the id that an element had in the original, or a new one if that is taken."""
         if number > 0 and number not in self._taken:
             self._taken.add(number)
+            self._last = max(self._last, number)
             return number
         fresh = self.fresh()
         self._notices.append(f'{name} has the id {fresh}, for {number} is '
@@ -34,9 +36,9 @@ class IdPool:
 
     def fresh(self) -> int:
         """Return an unused id."""
-        number = max(self._taken, default=0) + 1
-        self._taken.add(number)
-        return number
+        self._last += 1
+        self._taken.add(self._last)
+        return self._last
 
 
 def renumber(elements: Iterable[etree._Element], taken: set[int], notices: list[str],
@@ -55,12 +57,12 @@ def renumber(elements: Iterable[etree._Element], taken: set[int], notices: list[
     """
     elements = list(elements)
     used = set(reserved)
-    pool = IdPool({max(taken, default=0), *taken}, [])
+    pool = IdPool(set(taken), [])
     changed: dict[tuple[str, int, etree._Element | None], int] = {}
     lanelets: dict[int, int] = {}
     for element in elements:
         for node in (element, *element.iterchildren('incoming')):
-            number = _number(node.get('id'))
+            number = whole_number(node.get('id'))
             if number is None:
                 continue
             new = number
@@ -77,14 +79,22 @@ def renumber(elements: Iterable[etree._Element], taken: set[int], notices: list[
         for reference in element.iterfind('.//*[@ref]'):
             kind = _SIGNALS.get(reference.tag, 'lanelet')
             scope = element if kind == 'incoming' else None
-            number = _number(reference.get('ref'))
+            number = whole_number(reference.get('ref'))
             if number is not None and (kind, number, scope) in changed:
                 reference.set('ref', str(changed[kind, number, scope]))
     return lanelets
 
 
-def _number(text: str | None) -> int | None:
+def whole_number(text: str | None) -> int | None:
+    """Return the number in a text, of at most 18 digits; None if there is none."""
     try:
-        return int(text or '')
+        number = int(text or '')
     except ValueError:
         return None
+    return number if abs(number) < 10 ** 18 else None
+
+
+def ids_of(elements: Iterable[etree._Element]) -> set[int]:
+    """Return the ids of elements, without those that are no numbers."""
+    return {number for element in elements
+            if (number := whole_number(element.get('id'))) is not None}

@@ -18,7 +18,7 @@ from commonroad.common.writer.file_writer_xml import (
 from commonroad.scenario.scenario import Location
 from crgame_ros.errors import InputError
 from crgame_ros.scenario import guard
-from crgame_ros.scenario.export_ids import renumber
+from crgame_ros.scenario.export_ids import ids_of, renumber, whole_number
 from crgame_ros.scenario.loading import LoadedScenario
 from lxml import etree
 
@@ -92,7 +92,7 @@ def write_roads(loaded: LoadedScenario, shift: int, notices: list[str]) -> Writt
     :raises InputError: if they cannot be written so that the schema accepts them.
     """
     root = guard.parse_hardened(loaded.xml_text, loaded.source)
-    taken = {int(node.get('id')) for node in root.iter('*') if _is_integer(node.get('id'))}
+    taken = ids_of(root.iter('*'))
     if root.get('commonRoadVersion') == '2020a':
         copied, remarks = _completed([deepcopy(child) for tag in _PARTS
                                       for child in root.iterchildren(tag)], shift)
@@ -115,16 +115,7 @@ def write_roads(loaded: LoadedScenario, shift: int, notices: list[str]) -> Writt
 
 def used_ids(elements: list[etree._Element]) -> set[int]:
     """Return all ids of the elements."""
-    return {int(node.get('id')) for element in elements for node in element.iter()
-            if node.get('id') is not None}
-
-
-def _is_integer(text: str | None) -> bool:
-    try:
-        int(text or '')
-    except ValueError:
-        return False
-    return True
+    return ids_of(node for element in elements for node in element.iter('*'))
 
 
 def framed(elements: list[etree._Element]) -> etree._Element:
@@ -132,9 +123,9 @@ def framed(elements: list[etree._Element]) -> etree._Element:
     frame = etree.fromstring(_FRAME)
     frame.extend(deepcopy(elements))
     # The schema refuses ids that are not numbers; the problem's id must differ from references.
-    numbers = [int(text) for node in frame.iter('*')
-               for text in (node.get('id', ''), node.get('ref', '')) if text.isdecimal()]
-    frame.append(etree.fromstring(_PROBLEM.format(max(numbers, default=0) + 1)))
+    numbers = [number for node in frame.iter('*') for name in ('id', 'ref')
+               if (number := whole_number(node.get(name))) is not None]
+    frame.append(etree.fromstring(_PROBLEM.format(max((0, *numbers)) + 1)))
     return frame
 
 

@@ -145,10 +145,11 @@ def _seconds_to_steps(root: etree._Element) -> bool:
         if step <= 0.0 or not _on_grid(strict, step) or all(
                 (node.text or '').strip().lstrip('+-').isdecimal() for node in nodes):
             return False
+        steps = [str(round(time / step)) for time in times]
     except (OverflowError, ValueError):
         return False
-    for node, time in zip(nodes, times, strict=True):
-        node.text = str(round(time / step))
+    for node, text in zip(nodes, steps, strict=True):
+        node.text = text
     return True
 
 

@@ -11,6 +11,7 @@ import re
 from crgame_ros.errors import InputError
 from crgame_ros.library.stored_index import MAX_BYTES
 from crgame_ros.paths import irregular
+from crgame_ros.scenario.export_ids import whole_number
 from lxml import etree
 
 MAX_MAGNITUDE = 1e9
@@ -104,22 +105,26 @@ def refuse_malformed(root: etree._Element, source: str) -> None:
     lanelets = root.findall('lanelet')
     if not lanelets:
         raise InputError('has no lanelets', source, 'give a scenario with a road network')
-    count = sum(_check_bounds(lanelet, source) for lanelet in lanelets)
-    if count > MAX_POINTS:
-        raise InputError(f'the bounds of its lanelets have {count} points, more than '
-                         f'{MAX_POINTS}', source, 'thin them out, or cut the map')
+    points = {lanelet.get('id'): _check_bounds(lanelet, source) for lanelet in lanelets}
     for element in root.iterchildren(*OBSTACLE_TAGS, 'planningProblem'):
         _check_states(element, source)
     for occupancies in root.iterfind('phantomObstacle/occupancySet'):
         if occupancies.find('occupancy') is None:
             raise InputError('its <occupancySet> has no <occupancy>', where(occupancies, source),
                              'add one, or remove the set')
-    known = {lanelet.get('id') for lanelet in lanelets}
     for reference in root.iterfind('.//position/lanelet'):
-        if reference.get('ref') not in known:
+        if reference.get('ref') not in points:
             name = 'goal' if reference.getparent().getparent().tag == 'goalState' else 'position'
             raise InputError(f'the {name} names lanelet {reference.get("ref")}, which does not '
                              'exist', where(reference, source), f'correct the {name}')
+    # Each position of an obstacle in a lanelet becomes an area of its own.
+    count = sum(points.values()) + sum(
+        points[reference.get('ref')] for obstacle in root.iterchildren(*OBSTACLE_TAGS)
+        for reference in obstacle.iterfind('.//position/lanelet'))
+    if count > MAX_POINTS:
+        raise InputError(f'its lanelets, and those that are positions of obstacles, have {count} '
+                         f'points, more than {MAX_POINTS}', source,
+                         'thin them out, or cut the map')
 
 
 def where(element: etree._Element, source: str) -> str:
@@ -199,11 +204,10 @@ def _check_ids(root: etree._Element, source: str) -> None:
     for element in root.iterchildren(*_TOP_LEVEL_IDS, 'planningProblem'):
         kind = problems if element.tag == 'planningProblem' else seen
         text = element.get('id')
-        try:
-            number = int(text)
-        except (TypeError, ValueError):
+        number = whole_number(text)
+        if number is None:
             raise InputError(f'<{element.tag}> has the id {text!r}', where(element, source),
-                             'give a whole number') from None
+                             'give a whole number of at most 18 digits')
         if number in kind:
             raise InputError(f'the id {number} is used by a {kind[number]} too',
                              where(element, source), 'give each element an id of its own')
@@ -211,21 +215,22 @@ def _check_ids(root: etree._Element, source: str) -> None:
         # References are compared as text later, so ids are normalised: ' 07' equals '7'.
         element.set('id', str(number))
     for reference in root.iterfind('.//*[@ref]'):
-        try:
-            reference.set('ref', str(int(reference.get('ref'))))
-        except ValueError:
+        number = whole_number(reference.get('ref'))
+        if number is None:
             raise InputError(f'<{reference.tag}> refers to {reference.get("ref")!r}',
-                             where(reference, source), 'give the id of an element') from None
+                             where(reference, source), 'give the id of an element')
+        reference.set('ref', str(number))
 
 
 def _check_numbers(root: etree._Element, source: str) -> None:
     for element in root.iter(*_FLOAT_TAGS, *_INTEGER_TAGS, *_EITHER_TAGS):
-        if len(element):
+        # That of a state holds its value in a child, which is checked itself.
+        if len(element) and element.tag == 'orientation':
             continue
         integer = element.tag in _INTEGER_TAGS or (
             element.tag in _EITHER_TAGS and element.getparent().tag == 'time')
         try:
-            value = int(element.text) if integer else float(element.text)
+            value = math.nan if len(element) else (int if integer else float)(element.text)
         except (TypeError, ValueError):
             value = math.nan
         if not abs(value) <= MAX_MAGNITUDE:

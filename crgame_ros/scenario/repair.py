@@ -10,7 +10,7 @@ import re
 from commonroad.scenario.scenario import ScenarioID, TimeOfDay, Underground, Weather
 from commonroad.scenario.traffic_light import TrafficLightDirection
 from crgame_ros.scenario import guard
-from crgame_ros.scenario.export_ids import renumber
+from crgame_ros.scenario.export_ids import ids_of, renumber
 from lxml import etree
 
 # A published map has an intended gap of 160 m; paths are sampled along gaps [m].
@@ -182,12 +182,13 @@ def _mend_references(root: etree._Element, notices: list[str]) -> None:
                        f'{"are" if many else "is"} ignored{", the first" * many}: '
                        f'{next(iter(dropped))}')
     # A sign or light that only the stop line names concerns its lanelet.
-    for line in root.iterfind('lanelet/stopLine'):
-        lanelet = line.getparent()
-        for reference in line.iterfind('*[@ref]'):
-            if reference.get('ref') not in {each.get('ref') for each in
-                                            lanelet.iterchildren(reference.tag)}:
-                etree.SubElement(lanelet, reference.tag, ref=reference.get('ref'))
+    for lanelet in root.iterchildren('lanelet'):
+        known = {(each.tag, each.get('ref')) for each in lanelet}
+        for reference in lanelet.findall('stopLine/*[@ref]'):
+            named = reference.tag, reference.get('ref')
+            if named not in known:
+                known.add(named)
+                etree.SubElement(lanelet, named[0], ref=named[1])
     for tag in ('trafficSign', 'trafficLight'):
         used = {e.get('ref') for e in root.iterfind(f'lanelet/{tag}Ref')}
         for element in root.findall(tag):
@@ -324,10 +325,8 @@ def _complete_state(state: etree._Element) -> None:
 
 def _mend_incomings(root: etree._Element, notices: list[str]) -> None:
     """Make ids of incomings unique; the guard has checked all other ids."""
-    reserved = {int(element.get('id')) for element in root.iterchildren('*')
-                if element.get('id') is not None and element.tag != 'intersection'}
-    inside = {int(node.get('id')) for node in root.iterfind('intersection//*[@id]')
-              if node.get('id').lstrip('-').isdecimal()}
+    reserved = ids_of(node for node in root.iterchildren('*') if node.tag != 'intersection')
+    inside = ids_of(root.iterfind('intersection//*[@id]'))
     renumber(root.findall('intersection'), reserved | inside, notices, reserved)
 
 

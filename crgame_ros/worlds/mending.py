@@ -7,7 +7,7 @@ from copy import deepcopy
 import math
 
 from commonroad.scenario.traffic_sign import TrafficSignIDCountries
-from crgame_ros.scenario.export_ids import IdPool
+from crgame_ros.scenario.export_ids import IdPool, ids_of
 from crgame_ros.worlds.opendrive import LightCycle
 from lxml import etree
 import numpy as np
@@ -263,8 +263,7 @@ def _cut_turning(root: etree._Element, lanelets: dict[str, Bounds], remarks: lis
             parts |= dict.fromkeys(group, count)
     if not parts:
         return
-    ids = IdPool({int(node.get('id')) for node in root.iter('*')
-                  if (node.get('id') or '').isdecimal()}, [])
+    ids = IdPool(ids_of(root.iter('*')), [])
     numbers = {number: [number, *(str(ids.fresh()) for _ in range(count - 1))]
                for number, count in parts.items()}
     for number, count in parts.items():

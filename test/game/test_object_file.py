@@ -93,6 +93,7 @@ REFUSED: list[tuple[Any, str]] = [
     ([{**BIN, 'id': 'Bin'}], r'objects\[0\]: "id" is .Bin.'),
     ([{**BIN, 'id': 'hv0'}], '"id" is .hv0.'),
     ([{**BIN, 'id': 'o12'}], '"id" is .o12.'),
+    ([{**BIN, 'id': 'o30_2'}], '"id" is .o30_2.'),
     ([{**BIN, 'id': 'e_x'}], '"id" is .e_x.'),
     ([{**BIN, 'id': 7}], '"id" is 7'),
     ([{**BIN, 'id': 'a'}, {**BIN, 'id': 'a'}], r'objects\[1\]: "a" is there already'),

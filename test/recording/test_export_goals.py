@@ -70,20 +70,26 @@ def test_goals_of_every_form(runs: Any, tmp_path: Path) -> None:
         '</intervalEnd></orientation></goalState>'
         '<goalState><time><intervalStart>1</intervalStart><intervalEnd>90</intervalEnd></time>'
         '<position><polygon><point><x>0</x><y>0</y></point><point><x>9</x><y>0</y></point>'
-        '<point><x>0</x><y>9</y></point></polygon></position></goalState>')
+        '<point><x>0</x><y>9</y></point></polygon></position></goalState>'
+        '<goalState><time><intervalStart>1</intervalStart><intervalEnd>90</intervalEnd></time>'
+        '<position><circle><radius>2.5</radius><center><x>1</x><y>2</y></center></circle>'
+        '<rectangle><length>4</length><width>2</width><orientation>0</orientation>'
+        '<center><x>20</x><y>2</y></center></rectangle></position></goalState>')
     text = re.sub(r'<goalState>.*</goalState>', goals, runs.own(CUT_IN), flags=re.DOTALL)
     text = text.replace('ref="11"', f'ref="{re.search("<lanelet id=.(.+?).>", text)[1]}"')
     log = runs.drive(re.sub(r'(<time>\s*<exact>)0(</exact>)', r'\g<1>10\2', text), tmp_path)
     exported = export_scenario(log)
     _, problems = runs.read_back(exported)
     goal = problems.planning_problem_dict[100].goal
-    first, second, third = goal.state_list
+    first, second, third, mixed = goal.state_list
     times = [(state.time_step.start, state.time_step.end) for state in goal.state_list]
-    assert times == [(20, 30), (0, 20), (0, 80)]
+    assert times == [(20, 30), (0, 20), (0, 80), (0, 80)]
     assert list(goal.lanelets_of_goal_position) == [0]
     assert (first.velocity.start, first.velocity.end) == (1.5, 2.5)
     assert [(part.radius, *part.center) for part in second.position.shapes] == [
         (2.5, 1.0, 2.0), (1.5, 9.0, 2.0)]
     assert second.orientation.length == pytest.approx(6.2831852, abs=1e-9)
     assert third.position.shapely_object.area == 40.5
+    assert [part.shapely_object.area for part in mixed.position.shapes] == pytest.approx(
+        [math.pi * 2.5 ** 2, 8.0], rel=0.01)
     assert any('av0: the time of its goal is over' in notice for notice in exported.notices)

@@ -5,6 +5,7 @@
 import ast
 from dataclasses import replace
 import json
+import math
 from pathlib import Path
 import pickle
 import re
@@ -24,18 +25,21 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 CUT_IN = scenarios_directory() / 'cut_in.yaml'
+CROSSING = scenarios_directory() / 'crossing.yaml'
 
 
 class Failing(crgame_ros.Planner):
     """Finds nothing."""
 
     name = 'failing'
+    asked = 0
 
     def setup(self, context: crgame_ros.PlannerContext) -> None:
         """Do nothing."""
 
     def plan(self, request: crgame_ros.PlanRequest) -> Plan:
         """Find nothing."""
+        type(self).asked += 1
         raise crgame_ros.PlanningError('there is no way')
 
 
@@ -105,7 +109,7 @@ def test_a_run_is_that_of_the_command(run: OfflineRun, capsys: pytest.CaptureFix
     assert main(['offline', str(CUT_IN), '--duration', '3']) == 0
     told = json.loads(capsys.readouterr().out)
     assert {**run.summary(), 'wall_s': 0} == {**told, 'wall_s': 0}
-    words = ['offline', str(scenarios_directory() / 'crossing.yaml'), '--duration', '2',
+    words = ['offline', str(CROSSING), '--duration', '2',
              '--latency', '3', '--planner', 'constant-velocity', '--trigger', 'leader-brakes@0.5']
     assert main(words) == 0
     told = json.loads(capsys.readouterr().out)
@@ -189,6 +193,24 @@ def test_each_av_has_a_planner_of_its_own() -> None:
     for planner in (one, [one, one]):
         with pytest.raises(crgame_ros.InputError, match='one object for 2 AVs'):
             crgame_ros.run(game, planner=planner, duration_s=0.5)
+    # Told before the first of several planners drives.
+    Failing.asked = 0
+    with pytest.raises(crgame_ros.InputError, match='one object for 2 AVs'):
+        crgame_ros.replay(found, [Failing, one])
+    assert Failing.asked == 0
+
+
+def test_the_chosen_run_of_a_recording(run: OfflineRun, recorder: Any, tmp_path: Path) -> None:
+    """Everything is that of the chosen run, also what does not need its trajectories."""
+    later = crgame_ros.run(CUT_IN, duration_s=0.5)
+    recorder.ours(tmp_path / 'bag', [
+        *recorder.messages(run.result),
+        *recorder.messages(later.result, epoch=1, offset_ns=9_000_000_000,
+                           log_ns=1_700_000_009_000_000_000)])
+    for epoch, original in ((0, run), (1, later), (None, later)):
+        chosen = crgame_ros.read_run(tmp_path, epoch)
+        assert chosen.duration_s == original.duration_s
+        assert chosen.timed.cycles.column('n')[-1] == len(original.result.vehicle_states) - 1
 
 
 def test_a_notebook_shows_it(run: OfflineRun) -> None:
@@ -216,7 +238,9 @@ def test_a_notebook_shows_it(run: OfflineRun) -> None:
     ({'planner': Failing(), 'options': {'speed': 1}}, 'cannot have options'),
     ({'seed': -1}, 'seed: is -1'), ({'duration_s': -1.0}, 'duration: is -1.0 s'),
     ({'rate_hz': 0.0}, 'rate_hz: '), ({'latency_steps': -1}, 'latency: is -1'),
-    ({'driver': 'cockpit'}, 'needs a person'), ({'triggers': {'x': 0.0}}, 'no event "x"'),
+    ({'driver': 'cockpit'}, 'needs a person'), ({'triggers': {'x': 9.0}}, 'no event "x"'),
+    ({'game': CROSSING, 'triggers': {'roadworks': math.nan}}, 'trigger roadworks: is nan s'),
+    ({'game': CROSSING, 'triggers': {'roadworks': -1.0}}, 'trigger roadworks: is -1.0 s'),
     ({'problems': [1]}, 'problems: the game names its AVs')])
 def test_what_cannot_be_used_is_an_input_error(arguments: dict[str, Any], said: str) -> None:
     """The error is one line with the argument or file and the reason."""

@@ -4,10 +4,13 @@
 
 import os
 from pathlib import Path
+import time
 
 from crgame_ros.errors import InputError
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.loading import load_scenario, parse_scenario
+from crgame_ros.scenario.repair import mend
+from lxml import etree
 import pytest
 
 BOUND = '<{name}><point><x>0</x><y>{y}</y></point><point><x>50</x><y>{y}</y></point></{name}>'
@@ -28,6 +31,11 @@ def obstacle(x: str = '10', t: str = '0', shape: str = SHAPE, kind: str = 'car')
     return (f'<dynamicObstacle id="7"><type>{kind}</type>{shape}'
             + STATE.format(tag='initialState', x='9', t='0') + '<trajectory>'
             + STATE.format(tag='state', x=x, t=t) + '</trajectory></dynamicObstacle>')
+
+
+PROBLEM = ('<planningProblem id="9">' + STATE.format(tag='initialState', x='5', t='0')
+           + '<goalState><time><intervalStart>{}</intervalStart><intervalEnd>9</intervalEnd>'
+           '</time></goalState></planningProblem>')
 
 
 def with_obstacle(text: str) -> str:
@@ -54,6 +62,21 @@ MALFORMED = {
     'huge number': (VALID.replace('<x>50</x>', '<x>1e300</x>', 1), "'1e300'"),
     'no number': (VALID.replace('<x>50</x>', '<x>fifty</x>', 1), "'fifty'"),
     'empty number': (VALID.replace('<x>50</x>', '<x/>', 1), "'empty'"),
+    'number with a child': (VALID.replace('<x>0</x>', '<x>0<b/></x>', 1), '<x> is '),
+    'time with a child': (with_obstacle(obstacle(t='<b/>')), "'empty', no usable whole number"),
+    'speed with a child': (with_obstacle(PROBLEM.format('1').replace(
+        '<exact>5</exact>', '<exact><b>5</b></exact>')), "'empty', no usable number"),
+    'interval with a child': (with_obstacle(obstacle(t='1').replace(
+        '<exact>1</exact>', '<intervalStart><b/></intervalStart><intervalEnd>2</intervalEnd>')),
+        '<intervalStart> is '),
+    'height with a child': (VALID.replace('<y>2</y>', '<y>2</y><z><b/></z>'), '<z> is '),
+    'nan in the goal of 2017a': (with_obstacle(PROBLEM.format('nan')).replace('2020a', '2017a'),
+                                 "<intervalStart> is 'nan'"),
+    'infinite goal of 2017a': (with_obstacle(PROBLEM.format('inf')).replace('2020a', '2017a'),
+                               "<intervalStart> is 'inf'"),
+    'id of an incoming': (with_obstacle('<intersection id="3"><incoming id="--5"/>'
+                                        '</intersection>'), 'commonroad-io cannot read it'),
+    'endless id': (VALID.replace('id="1"', f'id="{10 ** 18}"'), 'at most 18 digits'),
     'duplicate ids': (VALID.replace(LANELET, LANELET * 2), 'the id 1 is used'),
     'duplicate ids of two kinds': (with_obstacle(obstacle().replace('"7"', '" 01"')),
                                    'the id 1 is used by a lanelet'),
@@ -102,6 +125,43 @@ def test_the_valid_file_behind_the_malformed_ones_is_read() -> None:
     loaded = parse_scenario(with_obstacle(obstacle(t='1')), 'good.xml')
     assert [x.lanelet_id for x in loaded.scenario.lanelet_network.lanelets] == [1]
     assert loaded.scenario.obstacle_by_id(7).state_at_time(1).position.tolist() == [10.0, 0.0]
+
+
+@pytest.mark.parametrize('text', [
+    '<note id="abc"/>', f'<note id="{"9" * 5000}"/>',
+    '<intersection id="3"><incoming id="4"><successorsLeft id="x" ref="1"/></incoming>'
+    '</intersection>'])
+def test_ids_that_nothing_reads_may_be_anything(text: str) -> None:
+    """They are no reason to refuse a file."""
+    assert parse_scenario(with_obstacle(text), 'good.xml').scenario.lanelet_network.lanelets
+
+
+def test_repairs_take_time_in_proportion_to_the_file() -> None:
+    """Small files of many repeated ids and references would block the program for minutes."""
+    numbers = range(100, 10_100)
+    signs = ''.join(f'<trafficSign id="{number}"/>' for number in numbers)
+    references = ''.join(f'<trafficSignRef ref="{number}"/>' for number in numbers)
+    root = etree.fromstring(VALID.split('\n')[1].replace(
+        '</lanelet>', f'<stopLine>{references}</stopLine></lanelet>').replace(
+        '</commonRoad>', signs + '<intersection id="2">' + '<incoming id="2"/>' * 30_000
+        + '</intersection></commonRoad>'))
+    guard.refuse_malformed(root, 'x')
+    began_s = time.process_time()
+    mend(root)
+    assert time.process_time() - began_s < 5.0
+    assert len(root.findall('lanelet/trafficSignRef')) == len(numbers)
+    assert len({node.get('id') for node in root.iterfind('intersection/incoming')}) == 30_000
+
+
+def test_positions_in_lanelets_count_as_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each becomes the outline of its lanelet: a small file would fill the memory."""
+    text = with_obstacle(obstacle(t='1')).replace(
+        '<point><x>10</x><y>0</y></point>', '<lanelet ref="1"/>')
+    monkeypatch.setattr(guard, 'MAX_POINTS', 8)
+    assert parse_scenario(text, 'x.xml').scenario.obstacle_by_id(7)
+    monkeypatch.setattr(guard, 'MAX_POINTS', 7)
+    with pytest.raises(InputError, match='positions of obstacles, have 8 points, more than 7'):
+        guard.refuse_malformed(etree.fromstring(text.split('\n')[1]), 'x.xml')
 
 
 def test_message_names_the_line_of_the_element(tmp_path: Path) -> None:

@@ -61,6 +61,15 @@ def obstacles(text: str) -> ScenarioObstacles:
     return ScenarioObstacles(road_with(text))
 
 
+def test_too_many_cells_are_refused_before_they_are_allocated() -> None:
+    """A small file whose obstacles come back after hours would fill the memory."""
+    one = dynamic(state('initialState', 0, 5.0) + '<trajectory>' + state('state', 100_000, 9.0)
+                  + '</trajectory>')
+    loaded = road_with(''.join(one.replace('"7"', f'"{7 + index}"') for index in range(50)))
+    with pytest.raises(InputError, match='50 obstacles over 100001 time steps are too many'):
+        ScenarioObstacles(loaded)
+
+
 @pytest.mark.matrix('USA_US101-4_1_T-1.xml', 'OSC_PedestrianCollision-1_1_T-1.xml')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', [

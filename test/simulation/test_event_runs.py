@@ -160,6 +160,8 @@ def test_command_shows_and_takes_events(capsys: pytest.CaptureFixture[str]) -> N
     assert json.loads(capsys.readouterr().out)['events'] == [
         {'name': 'hide-plan', 'n': 50, 'k': 5, 'by': 'trigger'},
         {'name': 'roadworks', 'n': 110, 'k': 11, 'by': 'trigger'}]
-    for text in ('hide-plan', 'hide-plan@', '@1', 'hide-plan@soon', 'hide-plan@-1'):
+    for text, told in (('hide-plan', 'give NAME@SECONDS'), ('hide-plan@', 'give NAME@SECONDS'),
+                       ('hide-plan@soon', 'give NAME@SECONDS'), ('@1', 'no event ""'),
+                       ('hide-plan@-1', 'hide-plan: is -1.0 s'), ('fly@1', 'no event "fly"')):
         assert main(['offline', str(CROSSING), '--trigger', text]) == 2
-        assert 'give NAME@SECONDS' in capsys.readouterr().err
+        assert told in capsys.readouterr().err
