@@ -135,6 +135,8 @@ class ChunkBuilder:
         """Read the frames from step `low` up to, not including, step `high`."""
         spans = [span for topic, places in self._index.places.items()
                  if (span := places.span(low, high)) is not None]
+        if not spans:
+            return []
         from_ns, to_ns = min(span[0] for span in spans), max(span[1] for span in spans)
         found: list[_Entry] = []
         states: list[tuple[int, int, FloatArray]] = []

@@ -295,6 +295,22 @@ def test_lost_states_are_marked(tmp_path: Path, parked: OfflineResult) -> None:
         backend.close()
 
 
+def test_recorder_that_was_restarted(tmp_path: Path, parked: OfflineResult) -> None:
+    """What it wrote after its restart is shown, too; a chunk in the gap has no states."""
+    messages = recorder.messages(parked)
+    record(tmp_path / 'bag', [m for m in messages if m[2] < START + 3_000_000_000])
+    record(tmp_path / 'bag_part2', [m for m in messages if m[2] >= START + 11_000_000_000])
+    backend = ReplayBackend(tmp_path)
+    try:
+        assert backend.info()['duration_s'] == DURATION_S
+        chunks = [backend.chunk(number) for number in range(3)]
+        assert not read_frames(chunks[1]).states
+        assert [int(head[2]) for _, head, _ in read_frames(*chunks).states] == [
+            *range(300), *range(1100, STEPS + 1)]
+    finally:
+        backend.close()
+
+
 def test_plans_that_are_none_are_passed_over(tmp_path: Path, parked: OfflineResult) -> None:
     """A run with malformed plans can still be shown."""
     broken = [('/av0/plan', TRAJECTORY, START + 205_000_000, recorder.joints(
