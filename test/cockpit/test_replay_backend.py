@@ -267,7 +267,9 @@ def test_documents_hold_from_their_step_on(backend: ReplayBackend) -> None:
         (2.0, []), (4.53, ['o1']), (5.2, [])]
     assert [(t, content['av0']['stale']) for t, content in documents['planners']] == [
         (8.0, True), (9.0, False)]
-    assert documents['seats'][0][1] == {'seats': {'hv0': {'source': 'game', 'driver': 'idle'}}}
+    assert documents['seats'] == [[t, {'seats': {'hv0': {
+        'source': source, 'driver': 'idle', 'holder': None, 'holder_name': name}}}]
+        for t, source, name in ((0.0, 'game', None), (9.5, 'cockpit', 'Ada'))]
 
 
 def test_outline_is_every_fifth_state(backend: ReplayBackend) -> None:
