@@ -20,7 +20,7 @@ from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.page_messages import Command, Trigger
 from crgame_ros.cockpit.server import create_app, HUB, listen
-from crgame_ros.errors import InputError
+from crgame_ros.errors import CrgameError, InputError
 import numpy as np
 import pytest
 
@@ -44,6 +44,8 @@ class PumpBackend:
         self.present: list[str] = []
         self.gone: list[str] = []
         self.games: list[Path] = []
+        # Why it loads no game; empty if it does.
+        self.load_refusal = ''
         self.pumped = 0
         self.stopped = False
         self.held = asyncio.Event()
@@ -82,6 +84,8 @@ class PumpBackend:
     async def load_game(self, path: Path, client: Client | None = None, *,
                         takes_seat: bool = False) -> str:
         self.games.append(path)
+        if self.load_refusal:
+            raise CrgameError(self.load_refusal)
         return 'loaded'
 
     async def _pump(self, hub: Hub) -> None:
