@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
-from crgame_ros.cockpit.message_frames import Frame, MessageFrames, Place
+from crgame_ros.cockpit.frames import Place
+from crgame_ros.cockpit.message_frames import Frame, MessageFrames
 from crgame_ros.cockpit.replay_index import OCCUPANCY_TOPIC, pack, perception_topics, RunIndex
 from crgame_ros.errors import InputError
 from crgame_ros.messages.cdr import stamp_of

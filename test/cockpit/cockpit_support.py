@@ -15,7 +15,7 @@ from typing import Any, Literal
 from aiohttp import ClientSession, ClientWebSocketResponse, CookieJar, WSMsgType
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.client import Client
-from crgame_ros.cockpit.frames import encode_state
+from crgame_ros.cockpit.frames import encode_state, Place
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.page_messages import Command, Trigger
@@ -92,7 +92,7 @@ class PumpBackend:
         while True:
             self.pumped += 1
             hub.send_frame('state', self._frame or encode_state(
-                0, self.pumped, 0, 0.01 * self.pumped, np.zeros((2, 13))))
+                Place(0, self.pumped, 0, 0.01 * self.pumped), np.zeros((2, 13))))
             await asyncio.sleep(self._period_s)
 
 
