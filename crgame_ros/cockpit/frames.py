@@ -4,6 +4,7 @@
 
 from collections.abc import Sequence
 from enum import IntEnum
+from typing import NamedTuple
 
 from crgame_ros.analysis.criticality.rows import MEASURED
 from crgame_ros.errors import InputError
@@ -24,6 +25,22 @@ CRITICALITY_COLUMNS = 1 + 2 * len(MEASURED)
 _FLOAT = np.dtype('<f8')
 
 
+class Place(NamedTuple):
+    """
+    A place in a run.
+
+    :param epoch: counts resets.
+    :param n: simulation step.
+    :param k: scenario step.
+    :param t: time since the start of the run [s].
+    """
+
+    epoch: int
+    n: int
+    k: int
+    t: float
+
+
 class FrameKind(IntEnum):
     """The kind of a frame, its first number."""
 
@@ -38,65 +55,53 @@ class FrameKind(IntEnum):
     CRITICALITY = 9
 
 
-def encode_state(epoch: int, n: int, k: int, t: float, vehicles: ArrayLike) -> bytes:
+def encode_state(place: Place, vehicles: ArrayLike) -> bytes:
     """
     Encode the states of the driven vehicles.
 
-    :param epoch: counts resets.
-    :param n: simulation step.
-    :param k: scenario step.
-    :param t: time since the start of the run [s].
+    :param place: its place in the run.
     :param vehicles: (V, 13) x, y [m], yaw [rad] of the rear axle, speed [m/s], steering angle
         [rad], acceleration [m/s^2], yaw rate, steering rate [rad/s], then the command in force:
         throttle, brake, steering, reverse, lights (bits: 1 left indicator, 2 right indicator,
         4 horn); NaN if there is none.
     :raises InputError: if the array has another width.
     """
-    return _rows(FrameKind.STATE, epoch, n, k, t, (), vehicles, STATE_COLUMNS)
+    return _rows(FrameKind.STATE, place, (), vehicles, STATE_COLUMNS)
 
 
-def encode_objects(epoch: int, n: int, k: int, t: float, objects: ArrayLike) -> bytes:
+def encode_objects(place: Place, objects: ArrayLike) -> bytes:
     """
     Encode the poses of all other objects.
 
-    :param epoch: counts resets.
-    :param n: simulation step.
-    :param k: scenario step.
-    :param t: time since the start of the run [s].
+    :param place: its place in the run.
     :param objects: (M, 6) centre x, y [m], yaw [rad] and the velocities that lead to the pose at
         k + 1 [m/s, m/s, rad/s]; NaN where absent.
     :raises InputError: if the array has another width.
     """
-    return _rows(FrameKind.OBJECTS, epoch, n, k, t, (), objects, OBJECT_COLUMNS)
+    return _rows(FrameKind.OBJECTS, place, (), objects, OBJECT_COLUMNS)
 
 
-def encode_plan(epoch: int, n: int, k: int, t: float, vehicle: int, points: ArrayLike) -> bytes:
+def encode_plan(place: Place, vehicle: int, points: ArrayLike) -> bytes:
     """
     Encode the plan of an AV.
 
-    :param epoch: counts resets.
-    :param n: simulation step.
-    :param k: scenario step.
-    :param t: time since the start of the run [s].
+    :param place: its place in the run.
     :param vehicle: its index among the scene's vehicles.
-    :param points: (P, 5) rear-axle x, y [m], yaw [rad], speed [m/s], time after `t` [s].
+    :param points: (P, 5) rear-axle x, y [m], yaw [rad], speed [m/s], time after
+        `place.t` [s].
     :raises InputError: if the array has another width.
     """
-    return _rows(FrameKind.PLAN, epoch, n, k, t, (vehicle,), points, PLAN_COLUMNS)
+    return _rows(FrameKind.PLAN, place, (vehicle,), points, PLAN_COLUMNS)
 
 
-def encode_prediction(epoch: int, n: int, k: int, t: float, av: int, columns: Sequence[int],
-                      points: ArrayLike) -> bytes:
+def encode_prediction(place: Place, av: int, columns: Sequence[int], points: ArrayLike) -> bytes:
     """
     Encode the predictions of others that an AV is sent.
 
-    :param epoch: counts resets.
-    :param n: simulation step.
-    :param k: scenario step.
-    :param t: time since the start of the run [s].
+    :param place: its place in the run.
     :param av: index of the asking AV among the scene's vehicles.
     :param columns: (Q) predicted objects: 0 to V - 1 are vehicles, objects follow from V.
-    :param points: (Q, P, 3) x, y [m], yaw [rad], one scenario time step apart, from `t`.
+    :param points: (Q, P, 3) x, y [m], yaw [rad], one scenario time step apart, from there on.
     :raises InputError: if the arrays do not fit.
     """
     futures = np.asarray(points, dtype=_FLOAT)
@@ -105,22 +110,18 @@ def encode_prediction(epoch: int, n: int, k: int, t: float, av: int, columns: Se
                          'cockpit frame', f'give (Q, P, {PREDICTION_COLUMNS})')
     count, length = futures.shape[:2]
     frame = np.empty(8 + count * (1 + length * PREDICTION_COLUMNS), _FLOAT)
-    frame[:8] = (FrameKind.PREDICTION, epoch, n, k, t, av, length, count)
+    frame[:8] = (FrameKind.PREDICTION, *place, av, length, count)
     body = frame[8:].reshape(count, 1 + length * PREDICTION_COLUMNS)
     body[:, 0] = columns
     body[:, 1:] = futures.reshape(count, length * PREDICTION_COLUMNS)
     return frame.tobytes()
 
 
-def encode_scan(epoch: int, n: int, k: int, t: float, av: int, sensor: int, fan: ArrayLike,
-                ranges: ArrayLike) -> bytes:
+def encode_scan(place: Place, av: int, sensor: int, fan: ArrayLike, ranges: ArrayLike) -> bytes:
     """
     Encode the scan of a sensor.
 
-    :param epoch: counts resets.
-    :param n: simulation step of the scan.
-    :param k: scenario step.
-    :param t: time since the start of the run [s].
+    :param place: place of the scan in the run.
     :param av: index of its AV among the scene's vehicles.
     :param sensor: its index among the AV's sensors.
     :param fan: (7) pose of the sensor, x, y [m], yaw [rad] in map; angle of the first ray from
@@ -132,17 +133,14 @@ def encode_scan(epoch: int, n: int, k: int, t: float, av: int, sensor: int, fan:
     if np.shape(fan) != (SCAN_WIDTH,) or distances.ndim != 1:
         raise InputError(f'a scan of shapes {np.shape(fan)} and {distances.shape}',
                          'cockpit frame', f'give ({SCAN_WIDTH},) and (R,)')
-    return _flat((FrameKind.SCAN, epoch, n, k, t, av, sensor), fan, (len(distances),), distances)
+    return _flat((FrameKind.SCAN, *place, av, sensor), fan, (len(distances),), distances)
 
 
-def encode_estimate(epoch: int, n: int, k: int, t: float, av: int, estimate: ArrayLike) -> bytes:
+def encode_estimate(place: Place, av: int, estimate: ArrayLike) -> bytes:
     """
     Encode the pose estimate of an AV.
 
-    :param epoch: counts resets.
-    :param n: simulation step.
-    :param k: scenario step.
-    :param t: time since the start of the run [s].
+    :param place: its place in the run.
     :param av: index of the AV among the scene's vehicles.
     :param estimate: (8) rear-axle x, y [m], yaw [rad] in map, speed [m/s], yaw rate [rad/s], and
         the covariance of x and y: xx, xy, yy [m^2].
@@ -151,35 +149,29 @@ def encode_estimate(epoch: int, n: int, k: int, t: float, av: int, estimate: Arr
     if np.shape(estimate) != (ESTIMATE_WIDTH,):
         raise InputError(f'an estimate of shape {np.shape(estimate)}', 'cockpit frame',
                          f'give ({ESTIMATE_WIDTH},)')
-    return _flat((FrameKind.ESTIMATE, epoch, n, k, t, av), estimate)
+    return _flat((FrameKind.ESTIMATE, *place, av), estimate)
 
 
-def encode_seen(epoch: int, n: int, k: int, t: float, av: int, columns: Sequence[int]) -> bytes:
+def encode_seen(place: Place, av: int, columns: Sequence[int]) -> bytes:
     """
     Encode which objects the planner of an AV with perception is told of.
 
-    :param epoch: counts resets.
-    :param n: simulation step.
-    :param k: scenario step.
-    :param t: time since the start of the run [s].
+    :param place: its place in the run.
     :param av: index of the AV among the scene's vehicles.
     :param columns: (Q) seen or remembered: 0 to V - 1 are vehicles, objects follow from V.
     """
-    return _flat((FrameKind.SEEN, epoch, n, k, t, av, len(columns)), columns)
+    return _flat((FrameKind.SEEN, *place, av, len(columns)), columns)
 
 
-def encode_occupancy(epoch: int, n: int, k: int, t: float, origin: tuple[float, float],
-                     resolution: float, occupied: NDArray[np.bool_]) -> bytes:
+def encode_occupancy(place: Place, origin: tuple[float, float], resolution: float,
+                     occupied: NDArray[np.bool_]) -> bytes:
     """
     Encode the map of permanent obstacles.
 
     Bytes follow origin, resolution, rows and columns, padded to a whole number of values: bit 0
     of byte 0 is cell [0, 0], and the column index runs fastest.
 
-    :param epoch: counts resets.
-    :param n: simulation step.
-    :param k: scenario step.
-    :param t: time since the start of the run [s].
+    :param place: its place in the run.
     :param origin: x, y of the lower left corner in map [m]
     :param resolution: edge of a cell [m]
     :param occupied: (rows, columns); rows grow with y, columns with x.
@@ -189,38 +181,35 @@ def encode_occupancy(epoch: int, n: int, k: int, t: float, origin: tuple[float, 
         raise InputError(f'a grid of shape {occupied.shape} with cells of {resolution} m',
                          'cockpit frame', 'give (rows, columns) and finite lengths')
     bits = np.packbits(occupied, axis=None, bitorder='little').tobytes()
-    return _flat((FrameKind.OCCUPANCY, epoch, n, k, t, *origin, resolution,
+    return _flat((FrameKind.OCCUPANCY, *place, *origin, resolution,
                   *occupied.shape)) + bits + bytes(-len(bits) % _FLOAT.itemsize)
 
 
-def encode_criticality(epoch: int, n: int, k: int, t: float, rows: ArrayLike) -> bytes:
+def encode_criticality(place: Place, rows: ArrayLike) -> bytes:
     """
     Encode the criticality measures of the driven vehicles.
 
-    :param epoch: counts resets.
-    :param n: simulation step.
-    :param k: scenario step.
-    :param t: time since the start of the run [s].
+    :param place: its place in the run.
     :param rows: (S, 1 + 2 measures) index of the vehicle; then of each of `MEASURED` the most
         critical value and the other object: 0 to V - 1 are vehicles, objects follow from V, -1
         is none.
     :raises InputError: if the array has another width.
     """
-    return _rows(FrameKind.CRITICALITY, epoch, n, k, t, (), rows, CRITICALITY_COLUMNS)
+    return _rows(FrameKind.CRITICALITY, place, (), rows, CRITICALITY_COLUMNS)
 
 
 def _flat(*parts: ArrayLike) -> bytes:
     return b''.join(np.asarray(part, dtype=_FLOAT).tobytes() for part in parts)
 
 
-def _rows(kind: FrameKind, epoch: int, n: int, k: int, t: float, extra: tuple[int, ...],
-          rows: ArrayLike, width: int) -> bytes:
+def _rows(kind: FrameKind, place: Place, extra: tuple[int, ...], rows: ArrayLike,
+          width: int) -> bytes:
     table: NDArray[np.float64] = np.asarray(rows, dtype=_FLOAT)
     if table.ndim != 2 or table.shape[1] != width:
         raise InputError(f'{kind.name} of shape {table.shape}', 'cockpit frame',
                          f'give (any, {width})')
     start = 6 + len(extra)
     frame = np.empty(start + table.size, _FLOAT)
-    frame[:start] = (kind, epoch, n, k, t, *extra, len(table))
+    frame[:start] = (kind, *place, *extra, len(table))
     frame[start:] = table.ravel()
     return frame.tobytes()

@@ -206,10 +206,21 @@ class JobProcess:
     async def _running(self) -> asyncio.subprocess.Process:
         process = self._process
         if process is None or process.returncode is not None:
-            # Use the package of this process, and nothing from the working directory.
-            paths = [str(_PACKAGES), *filter(None, [os.environ.get('PYTHONPATH')])]
-            process = self._process = await asyncio.create_subprocess_exec(
-                sys.executable, '-P', '-m', self._module,
-                stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
-                env={**os.environ, 'PYTHONPATH': os.pathsep.join(paths)})
+            process = self._process = await start_module(self._module)
         return process
+
+
+async def start_module(module: str, *arguments: str,
+                       own_session: bool = False) -> asyncio.subprocess.Process:
+    """
+    Start a module of this package in a process of its own, with pipes.
+
+    :param module: dotted name.
+    :param own_session: whether Ctrl-C does not reach it.
+    """
+    # Use the package of this process, and nothing from the working directory.
+    paths = [str(_PACKAGES), *filter(None, [os.environ.get('PYTHONPATH')])]
+    return await asyncio.create_subprocess_exec(
+        sys.executable, '-P', '-m', module, *arguments, stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE, env={**os.environ, 'PYTHONPATH': os.pathsep.join(paths)},
+        start_new_session=own_session)

@@ -193,8 +193,11 @@ class Library:
             allowed_drivers=list(DRIVERS),
             allowed_planners=list(planner_names()))
         text = json.loads(answer)['text'].encode()
-        self._loaded = entry.id
         return await asyncio.to_thread(self._store_game, text)
+
+    def note_loaded(self, entry_id: str) -> None:
+        """Record that an entry is the scenario of the present run."""
+        self._loaded = entry_id
 
     def is_upload(self, entry_id: str) -> bool:
         """Return whether an entry is an upload."""

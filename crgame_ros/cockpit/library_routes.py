@@ -96,6 +96,7 @@ class _Routes:
         path = await self._library.write_game(choice)
         text = await self._backend.load_game(
             path, client, takes_seat=self._library.is_upload(choice.id))
+        self._library.note_loaded(choice.id)
         return web.json_response({'ok': True, 'text': without_paths(text)})
 
 

@@ -13,6 +13,7 @@ from crgame_ros.analysis.criticality.rows import (
     read_criticality_rows,
 )
 from crgame_ros.cockpit import frames
+from crgame_ros.cockpit.frames import Place
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import DrivenAv, GameDocument
 from crgame_ros.game.objects import ObjectDescription
@@ -121,15 +122,6 @@ MAX_CELLS = 2 ** 26
 _COVARIANCE = (0, 1, 7)
 
 
-class Place(NamedTuple):
-    """A place in a run: epoch, simulation step, scenario step, time [s]."""
-
-    epoch: int
-    n: int
-    k: int
-    t: float
-
-
 class ScanFrame(NamedTuple):
     """The frame of a scan with the AV's id and column and the index of the sensor."""
 
@@ -167,7 +159,7 @@ def _scan_frame(place: Place, message: Any, mounts: SensorMounts,
     ranges[np.isnan(ranges)] = np.inf
     increment = (last - first) / max(1, len(ranges) - 1)
     return ScanFrame(av, columns[av], mount.number, frames.encode_scan(
-        *place, columns[av], mount.number, (*pose, first, increment, longest, period_s),
+        place, columns[av], mount.number, (*pose, first, increment, longest, period_s),
         np.maximum(ranges, 0.0)))
 
 
@@ -188,7 +180,7 @@ def _estimate_frame(place: Place, column: int, message: Any) -> bytes:
                     *(covariance[index] for index in _COVARIANCE)])
     if not np.isfinite(row).all():
         raise InputError('holds numbers that are not finite', 'localization')
-    return frames.encode_estimate(*place, column, row)
+    return frames.encode_estimate(place, column, row)
 
 
 def _occupancy_frame(place: Place, message: Any) -> bytes:
@@ -205,7 +197,7 @@ def _occupancy_frame(place: Place, message: Any) -> bytes:
     if abs(info.origin.orientation.z) > 1e-9:
         raise InputError('is turned', '/occupancy', 'give a grid along the axes of map')
     origin = (float(info.origin.position.x), float(info.origin.position.y))
-    return frames.encode_occupancy(*place, origin, float(info.resolution),
+    return frames.encode_occupancy(place, origin, float(info.resolution),
                                    cells.reshape(info.height, info.width) > 50)
 
 
@@ -263,13 +255,13 @@ class MessageFrames:
 
         :param commands: (V, 6) consumed; None if unknown.
         """
-        return Frame('state', frames.encode_state(*place, state_rows(states, commands)))
+        return Frame('state', frames.encode_state(place, state_rows(states, commands)))
 
     def objects(self, place: Place, message: object) -> Frame:
         """Return the frame of `/traffic/objects`."""
         objects = self._world.object_states(message)
         return Frame('objects', frames.encode_objects(
-            *place, np.concatenate((objects.poses, objects.velocities), axis=1)))
+            place, np.concatenate((objects.poses, objects.velocities), axis=1)))
 
     def plan(self, place: Place, av: str, message: object) -> Frame:
         """Return the frame of an AV's plan."""
@@ -282,7 +274,7 @@ class MessageFrames:
         rows = np.column_stack((states[:, :StateColumn.SPEED + 1], 1e-9 * series.times_ns))
         rows[:, :3] = self._transforms[av].to_simulation(rows[:, :3])
         column = self.columns[av]
-        return Frame(f'plan:{column}', frames.encode_plan(*place, column, rows))
+        return Frame(f'plan:{column}', frames.encode_plan(place, column, rows))
 
     def seen(self, place: Place, av: str, message: Any) -> Frame | None:
         """Return the frame of the objects at a request's first point; None without perception."""
@@ -296,7 +288,7 @@ class MessageFrames:
         column = self.columns[av]
         here = np.flatnonzero(np.isfinite(first[layout.columns[:, 0]])).tolist()
         seen = sorted((column, *(self.columns[layout.ids[number]] for number in here)))
-        return Frame(f'seen:{column}', frames.encode_seen(*place, column, seen))
+        return Frame(f'seen:{column}', frames.encode_seen(place, column, seen))
 
     def prediction(self, place: Place, av: str, message: object) -> Frame:
         """Return the frame of a request's predictions of the objects that are present."""
@@ -309,7 +301,7 @@ class MessageFrames:
         columns = [self.columns[layout.ids[number]] for number in present.tolist()]
         column = self.columns[av]
         return Frame(f'prediction:{column}', frames.encode_prediction(
-            *place, column, columns, futures[present]))
+            place, column, columns, futures[present]))
 
     def estimate(self, place: Place, av: str, message: object) -> Frame:
         """Return the frame of an AV's pose estimate."""
@@ -338,7 +330,7 @@ class MessageFrames:
         if not ((numbers >= 0) & (numbers < len(self.columns))).all() or rows[0, 1] < 0:
             raise InputError('names a vehicle that is not in the game', CRITICALITY_TOPIC)
         return Frame('criticality', frames.encode_criticality(
-            *self.place(int(rows[0, 1])), most_critical_rows(rows)))
+            self.place(int(rows[0, 1])), most_critical_rows(rows)))
 
     def occupancy(self, place: Place, message: object) -> Frame:
         """Return the frame of the map of permanent obstacles, valid from a place on."""

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 import json
-import math
 from pathlib import Path
 
 from crgame_ros.cockpit.job_process import serve_jobs
-from crgame_ros.cockpit.scene import scene_document
+from crgame_ros.cockpit.scene import finite, scene_document
 from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
@@ -52,7 +51,7 @@ def preview(path: Path, kind: str) -> dict[str, object]:
         states.poses.tolist(), states.velocities.tolist(), strict=True)]
     return {
         'scene': scene_document(setup.loaded, setup.descriptions, document),
-        'states': {'vehicles': _without_nan(vehicles), 'objects': _without_nan(objects)},
+        'states': {'vehicles': finite(vehicles), 'objects': finite(objects)},
         'humans': [{'id': human.id, 'driver': human.driver} for human in setup.humans],
         'avs': [{'id': av.id, 'planner': av.spec.planner,
                  'planning_problem': av.planning_problem.planning_problem_id,
@@ -160,11 +159,6 @@ def _refuse_strangers(chosen: Mapping[str, object], specs: list[HumanSpec] | lis
     if not chosen.keys() <= {spec.id for spec in specs}:
         raise InputError('names a vehicle that the game does not have', 'choice',
                          'load the page again')
-
-
-def _without_nan(rows: list[list[float | None]]) -> list[list[float | None]]:
-    return [[None if value is None or math.isnan(value) else value for value in row]
-            for row in rows]
 
 
 if __name__ == '__main__':

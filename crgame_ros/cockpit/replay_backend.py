@@ -193,7 +193,7 @@ class ReplayBackend:
         self._thread.shutdown()
 
     def _open(self) -> tuple[BagReader, tuple[int, ...]]:
-        reader = BagReader(self.path)
+        reader = BagReader(self.path, parts=True)
         return reader, epoch_numbers(reader)
 
     def _run(self, epoch: int) -> Replay:

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
-from crgame_ros.cockpit.message_frames import Frame, MessageFrames, Place
+from crgame_ros.cockpit.frames import Place
+from crgame_ros.cockpit.message_frames import Frame, MessageFrames
 from crgame_ros.cockpit.replay_index import OCCUPANCY_TOPIC, pack, perception_topics, RunIndex
 from crgame_ros.errors import InputError
 from crgame_ros.messages.cdr import stamp_of
@@ -135,6 +136,8 @@ class ChunkBuilder:
         """Read the frames from step `low` up to, not including, step `high`."""
         spans = [span for topic, places in self._index.places.items()
                  if (span := places.span(low, high)) is not None]
+        if not spans:
+            return []
         from_ns, to_ns = min(span[0] for span in spans), max(span[1] for span in spans)
         found: list[_Entry] = []
         states: list[tuple[int, int, FloatArray]] = []

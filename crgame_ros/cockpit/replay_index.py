@@ -80,7 +80,7 @@ class Outline:
         """Return the samples as STATE frames, each after its length in bytes."""
         game = self._run.game
         return pack(frames.encode_state(
-            game.epoch, n, game.scheduler.k(n), n * game.scheduler.dt_s,
+            frames.Place(game.epoch, n, game.scheduler.k(n), n * game.scheduler.dt_s),
             state_rows(states, self._commands.get(n))) for n, states in self._states.items())
 
 

@@ -222,8 +222,8 @@ class TrackCollector:
                   {'fired': [asdict(event) for event in fired]})
 
 
-def _seats(text: str) -> dict[str, dict[str, str]]:
-    """Read the drivers of the seats, by name if the driver was at a page."""
-    return {name: {'source': entry.source, 'driver': entry.driver}
-            | ({'holder_name': entry.person.name} if entry.here and entry.person else {})
+def _seats(text: str) -> dict[str, dict[str, str | None]]:
+    """Read the drivers of the seats, by name if the driver was at a page; no page holds one."""
+    return {name: {'source': entry.source, 'driver': entry.driver, 'holder': None,
+                   'holder_name': entry.person.name if entry.here and entry.person else None}
             for name, entry in SEATS.read(text).items()}

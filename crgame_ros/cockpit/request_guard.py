@@ -17,11 +17,14 @@ from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.page_files import PageFile
 from crgame_ros.cockpit.rights import ALL_RIGHTS, Rights
+from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.errors import CrgameError, InputError
 
 # Simultaneous connections, in total and of one address; a browser opens six for a page.
 MAX_CONNECTIONS = 256
 MAX_OF_ADDRESS = 128
+# Until the end of a handshake, in which a connection is not counted yet [s]
+HANDSHAKE_S = 3.0
 # Until the first request, and between two of them [s]
 FIRST_REQUEST_S = 10.0
 NEXT_REQUEST_S = 40.0
@@ -191,7 +194,7 @@ class WatchedSite(web.BaseSite):
         self._server = await asyncio.get_running_loop().create_server(
             self._keeper.watched(server), self._host, self._port,
             ssl=self._ssl_context, backlog=self._backlog,
-            ssl_handshake_timeout=FIRST_REQUEST_S if self._ssl_context else None)
+            ssl_handshake_timeout=HANDSHAKE_S if self._ssl_context else None)
 
 
 class _StrangersMistakes(logging.Filter):
@@ -328,6 +331,8 @@ async def _answer(access: Access, request: web.Request,
             cookie = access.exchange(request.query['token'], cookie)
         except InputError as error:
             return web.Response(status=403, text=f'{error}\n')
+        except CrgameError as error:
+            return web.Response(status=500, text=f'{without_paths(str(error))}\n')
         rest = request.url.without_query_params('token').relative()
         answer = web.Response(status=303, headers={'Location': str(rest)})
         answer.set_cookie(name, cookie, httponly=True, samesite='Strict',

@@ -82,7 +82,7 @@ class Rights:
 ALL_RIGHTS = Rights()
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Link:
     """A link: the digests of its token and of the cookie that replaced the token."""
 
@@ -122,8 +122,7 @@ class Invitations:
         if len(self._links) >= MAX_LINKS:
             raise CrgameError(f'{MAX_LINKS} links have been made: start the cockpit again')
         token = secrets.token_urlsafe(TOKEN_BYTES)
-        self._links.append(_Link(_digest(token), role, seat))
-        self._write()
+        self._save([*self._links, _Link(_digest(token), role, seat)])
         return token
 
     def exchange(self, token: str, cookie: str | None) -> str:
@@ -133,6 +132,7 @@ class Invitations:
         :param cookie: the browser's cookie, if any: a browser may open its own link again.
         :return: the cookie.
         :raises InputError: with a readable sentence, if there is no such link or it was used.
+        :raises CrgameError: if that cannot be saved; the link then stays unused.
         """
         link = _find(self._links, 'token', token)
         if link is None:
@@ -142,8 +142,8 @@ class Invitations:
                 raise InputError(USED)
             return cookie
         cookie = secrets.token_urlsafe(TOKEN_BYTES)
-        link.cookie = _digest(cookie)
-        self._write()
+        used = replace(link, cookie=_digest(cookie))
+        self._save([used if each is link else each for each in self._links])
         return cookie
 
     def rights(self, cookie: str | None) -> Rights | None:
@@ -151,16 +151,18 @@ class Invitations:
         link = _find(self._links, 'cookie', cookie) if cookie else None
         return None if link is None else Rights.for_role(link.role, link.seat)
 
-    def _write(self) -> None:
+    def _save(self, links: list[_Link]) -> None:
+        """Write the links to the file, then use them."""
         part = self._path.with_suffix('.new')
         try:
             part.unlink(missing_ok=True)
             file = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
             with os.fdopen(file, 'w', encoding='utf-8') as stream:
-                json.dump([asdict(link) for link in self._links], stream)
+                json.dump([asdict(link) for link in links], stream)
             part.replace(self._path)
         except OSError as error:
             raise CrgameError(f'{self._path}: cannot be written ({error.strerror})') from error
+        self._links = links
 
 
 def _digest(secret: str) -> str:

@@ -7,7 +7,6 @@ from dataclasses import asdict
 import math
 from typing import Any
 
-from commonroad.geometry.shape import Circle, ShapeGroup
 from commonroad.geometry.shape import Shape as CommonRoadShape
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking
@@ -248,7 +247,7 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
         'contact': game.drivability.contact,
         'tasks': [_task(task, game.tasks) for task in game.tasks], 'language': game.language,
         'gaze': list(game.gaze_seats)}
-    return {name: _finite(value) for name, value in document.items()}
+    return {name: finite(value) for name, value in document.items()}
 
 
 def _task(spec: TaskSpec, tasks: Sequence[TaskSpec]) -> Document:
@@ -298,16 +297,8 @@ def _goal_polygons(problem: PlanningProblem) -> list[list[float]]:
         position = getattr(state, 'position', None)
         if isinstance(position, CommonRoadShape):
             polygons += [flat(np.asarray(part.exterior.coords)[:-1, :2])
-                         for part in _parts(_outline(position))]
+                         for part in _parts(group_outline(position))]
     return polygons
-
-
-def _outline(shape: CommonRoadShape) -> shapely.Geometry:
-    if isinstance(shape, ShapeGroup):
-        return group_outline(shape)
-    # commonroad-io's own outline of a circle has half its radius.
-    return group_outline(ShapeGroup([shape])) if isinstance(shape, Circle) \
-        else shape.shapely_object
 
 
 def _parts(outline: shapely.Geometry) -> list[shapely.Polygon]:
@@ -326,12 +317,12 @@ def _bounds(network: LaneletNetwork, game: GameDocument) -> list[float]:
     return flat(np.array([together.min(axis=0), together.max(axis=0)]))
 
 
-def _finite(value: object) -> object:
+def finite(value: object) -> object:
     """Replace NaN and infinities, which JSON does not have, by null."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
-        return {str(key): _finite(entry) for key, entry in value.items()}
+        return {str(key): finite(entry) for key, entry in value.items()}
     if isinstance(value, Iterable) and not isinstance(value, str):
-        return [_finite(entry) for entry in value]
+        return [finite(entry) for entry in value]
     return value

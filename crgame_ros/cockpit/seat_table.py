@@ -217,23 +217,28 @@ class SeatTable:
             raise InputError(f'the seat is kept for {name}', seat,
                              f'it is free in {math.ceil(left_s)} s, or when a director takes it')
 
-    def release(self, client: str, seat: str) -> HeldSeat | None:
+    def release(self, client: str, seat: str, *, person: str = '', may_displace: bool = True,
+                now_s: float = 0.0) -> HeldSeat | None:
         """
         Return a seat to the driver or planner of the game.
 
-        Any client may do that with a seat that has been left.
+        Any client that may claim a seat that has been left may do that with it.
 
+        :param person: id of the client's person.
+        :param may_displace: whether it may take a seat that is kept for an absent driver.
+        :param now_s: steady clock [s]
         :return: the seat as it was held, None if no client held it.
-        :raises InputError: if another client holds it or no client ever took it.
+        :raises InputError: if another client holds it, it is kept for another person, or no client
+            ever took it.
         """
         entry = self._known(seat)
         holder = self.held.get(seat)
         if holder is not None and holder.holder != client:
             raise InputError('another person has the seat', seat, 'ask for it')
-        if holder is None and entry.source != COCKPIT:
-            raise InputError('no person at this cockpit has the seat', seat)
-        if holder is None and entry.person is not None and seat not in self.absent_s:
-            raise InputError(f'{entry.person.name} drives in another cockpit', seat)
+        if holder is None:
+            if entry.source != COCKPIT:
+                raise InputError('no person at this cockpit has the seat', seat)
+            self._check_tenant(seat, person, may_displace, now_s)
         return self.held.pop(seat, None)
 
     def offer(self, client: str, seat: str, to: str) -> HeldSeat:

@@ -76,13 +76,10 @@ def _add_invite_routes(app: web.Application, access: Access, hub: Hub) -> None:
     :param hub: all clients.
     """
     async def invite(request: web.Request) -> web.Response:
-        try:
-            actor(request, hub, 'invite')
-            return web.json_response({'link': _link(access, request, await request.read())})
-        except CrgameError as error:
-            return web.json_response({'error': str(error)}, status=400)
+        actor(request, hub, 'invite')
+        return web.json_response({'link': _link(access, request, await request.read())})
 
-    app.router.add_post('/api/invite', invite)
+    app.router.add_post('/api/invite', library_routes.refusable(invite))
 
 
 def _link(access: Access, request: web.Request, body: bytes) -> str:
@@ -323,13 +320,15 @@ class Session:
             if message.type in (WSMsgType.CLOSE, WSMsgType.CLOSING, WSMsgType.CLOSED,
                                 WSMsgType.ERROR):
                 return WSCloseCode.OK, ''
-            client.heard_s = loop.time()
-            if not self._bucket.try_spend(client.heard_s):
+            now_s = loop.time()
+            if not self._bucket.try_spend(now_s):
                 return (WSCloseCode.POLICY_VIOLATION,
                         f'more than {MESSAGES_PER_S:g} messages a second')
             if message.type is WSMsgType.PING:
                 await self.socket.pong(message.data)
             elif message.type is WSMsgType.TEXT:
+                # A browser answers pings even if its page does nothing any more.
+                client.heard_s = now_s
                 await self._handle(client, message.data)
             elif message.type is WSMsgType.BINARY:
                 self._blame(client, InputError('is binary', 'message'))

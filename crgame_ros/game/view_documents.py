@@ -110,7 +110,8 @@ class ViewPicture:
         `steady_s` is no larger.
     :param place: of the view on the screen.
     :param eye: of the view.
-    :param shown: what is in it, nearest first; what lies over the view comes before.
+    :param shown: what is in it, the foremost first: what lies over the view, then what mirrors
+        show and their glass, then the nearest.
     """
 
     seat: VehicleId

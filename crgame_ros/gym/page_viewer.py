@@ -128,20 +128,20 @@ class PageViewer:
         time.sleep(max(0.0, self._due_s - now_s))
         scheduler, n = game.simulation.scheduler, game.simulation.n
         self._due_s += scheduler.time_step_s
-        place = (self._epoch, n, scheduler.k(n), n * scheduler.dt_s)
+        place = frames.Place(self._epoch, n, scheduler.k(n), n * scheduler.dt_s)
         objects = game.objects
         commands = np.array(game.simulation.command_rows, dtype=np.float64).reshape(
             -1, len(COMMAND_COLUMNS))
         made = {
-            'state': frames.encode_state(*place, state_rows(
+            'state': frames.encode_state(place, state_rows(
                 stacked(game.simulation.states), commands)),
-            'objects': frames.encode_objects(*place, np.concatenate(
+            'objects': frames.encode_objects(place, np.concatenate(
                 (objects.poses, objects.velocities), axis=1)),
             **_plans(game, place)}
         for seat in game.seats:
             self._status.add(Status(f'{seat.id}/drivability', 0, '', {
-                'collision': str(bool(seat.hit)).lower(), 'hit': ','.join(seat.hit)}), place[3])
-        status = {**self._status.document(), 't': place[3], 'n': n, 'k': place[2],
+                'collision': str(bool(seat.hit)).lower(), 'hit': ','.join(seat.hit)}), place.t)
+        status = {**self._status.document(), 't': place.t, 'n': n, 'k': place.k,
                   'epoch': self._epoch, 'measured_factor': None, 'frames_skipped': False,
                   'clients': 0}
         alarms = self._status.alarms_document()
@@ -170,7 +170,7 @@ class PageViewer:
         self._loop.close()
 
 
-def _plans(game: DrivingGame, place: tuple[int, int, int, float]) -> dict[str, bytes]:
+def _plans(game: DrivingGame, place: frames.Place) -> dict[str, bytes]:
     """Return the frames of the plans that AVs follow."""
     setup: Setup = game.setup
     made = {}
@@ -179,10 +179,10 @@ def _plans(game: DrivingGame, place: tuple[int, int, int, float]) -> dict[str, b
             continue
         column = len(setup.humans) + index
         states = av.plan.states
-        age_s = 1e-9 * (game.simulation.scheduler.stamp_ns(place[1]) - av.plan.stamp_ns)
+        age_s = 1e-9 * (game.simulation.scheduler.stamp_ns(place.n) - av.plan.stamp_ns)
         rows = np.column_stack((
             states[:, :StateColumn.SPEED + 1],
             np.arange(len(states)) * setup.scheduler.time_step_s - age_s))
         rows[:, :3] = av.setup.transform.to_simulation(rows[:, :3])
-        made[f'plan:{column}'] = frames.encode_plan(*place, column, rows)
+        made[f'plan:{column}'] = frames.encode_plan(place, column, rows)
     return made

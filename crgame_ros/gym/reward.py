@@ -14,7 +14,8 @@ from crgame_ros.analysis.criticality.criticality import COLUMN, MEASURES, TickMe
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.scores.driven_states import is_reached
 from crgame_ros.errors import InputError
-from crgame_ros.policy.route_guide import goal_area, RoutePlace
+from crgame_ros.policy.route_guide import RoutePlace
+from crgame_ros.scenario.exact_values import group_outline
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 
@@ -69,7 +70,7 @@ def _gate(goal: object) -> _Gate:
     last = math.inf if time is None else float(getattr(time, 'end', time))
     if not isinstance(position, Shape):
         return _Gate(first, last, -math.inf, -math.inf, math.inf, math.inf)
-    return _Gate(first, last, *goal_area(position).bounds)
+    return _Gate(first, last, *group_outline(position).bounds)
 
 
 class Decision(NamedTuple):

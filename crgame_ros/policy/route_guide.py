@@ -5,7 +5,7 @@
 import math
 from typing import NamedTuple
 
-from commonroad.geometry.shape import Shape, ShapeGroup
+from commonroad.geometry.shape import Shape
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.geometry.angles import wrap_pi
@@ -121,7 +121,7 @@ def _goal(driving: DrivingPath, problem: PlanningProblem | None) -> float:
     for state in problem.goal.state_list:
         position = getattr(state, 'position', None)
         if isinstance(position, Shape):
-            inside = shapely.intersects_xy(goal_area(position), *path.points.T)
+            inside = shapely.intersects_xy(group_outline(position), *path.points.T)
             found = np.flatnonzero(ahead & inside)
             if len(found):
                 return float(path.s[found[0]])
@@ -129,8 +129,3 @@ def _goal(driving: DrivingPath, problem: PlanningProblem | None) -> float:
     return min((first for lanelet, (first, _) in zip(
         driving.lanelets, driving.lanelet_spans.tolist(), strict=True) if lanelet in goals),
         default=math.inf)
-
-
-def goal_area(position: Shape) -> shapely.Geometry:
-    """Return the area of a goal's position."""
-    return group_outline(position if isinstance(position, ShapeGroup) else ShapeGroup([position]))

@@ -109,12 +109,15 @@ export interface Variants {
     const { width, height, top, bottom, side } = LINES;
     const picture = svg(box, 'svg', { viewBox: `0 0 ${width} ${height}`, class: 'lines',
       role: 'img', 'aria-label': 'Variants as lines over all dimensions' });
-    const goals = data.goals.map(goalAxis);
-    const columns = [...data.axes, ...goals];
+    // A goal without any value, as where no variant could be run, has no axis.
+    const valued = [...data.goals.keys()].filter(
+      (index) => points.some((point) => point.values[index] !== null));
+    const columns = [...data.axes, ...valued.map((index) => goalAxis(data.goals[index], index))];
     const step = (width - 2 * side) / Math.max(1, columns.length - 1);
     const y = (share: number) => top + (1 - share) * (height - top - bottom);
     for (const point of points) {
-      const values = [...data.axes.map((axis) => point.variant[axis.name]), ...point.values];
+      const values = [...data.axes.map((axis) => point.variant[axis.name]),
+        ...valued.map((index) => point.values[index])];
       const corners = columns.flatMap((axis, index) => {
         const share = place(axis, values[index]);
         return share === null ? [] : [`${side + index * step},${y(share).toFixed(1)}`];

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from browser_support import Browser
-from crgame_ros.cockpit.frames import encode_seen
+from crgame_ros.cockpit.frames import encode_seen, Place
 from crgame_ros.page_libraries import find_libraries
 from crgame_ros.paths import scenarios_directory
 import numpy as np
@@ -97,7 +97,7 @@ def test_the_small_map_shows_plans_and_perception_when_asked_in_the_3d_view(
     road = page.run(PIXEL, *beside)
     cockpit.call(cockpit.backend.send_plan, 1, plan)
     # Its planner's request has no other vehicle: on the map all others are outlines.
-    cockpit.call(cockpit.backend.hub.send_frame, 'seen:1', encode_seen(0, 0, 0, 0.0, 1, []))
+    cockpit.call(cockpit.backend.hub.send_frame, 'seen:1', encode_seen(Place(0, 0, 0, 0.0), 1, []))
     page.wait('crgame.store.plans.size === 1 && crgame.store.perceived.seenBy(1, 0) !== null')
     found = []
     for switched in (False, True, False):

@@ -9,7 +9,7 @@ import sys
 from typing import Any
 
 from browser_support import Browser
-from crgame_ros.cockpit.frames import encode_occupancy, encode_scan, encode_seen
+from crgame_ros.cockpit.frames import encode_occupancy, encode_scan, encode_seen, Place
 from crgame_ros.cockpit.replay_backend import ReplayBackend
 from crgame_ros.paths import scenarios_directory
 import numpy as np
@@ -134,7 +134,7 @@ def color(browser: Browser, name: str) -> list[int]:
 def scan(sensor: int, ranges: NDArray[np.float64], n: int = 0) -> bytes:
     """Make a scan of the AV over a full circle."""
     fan = (100.0, 5.0, 0.5, -np.pi, 2.0 * np.pi / len(ranges), 80.0, 0.1)
-    return encode_scan(0, n, 0, n * 0.01, 1, sensor, fan, ranges)
+    return encode_scan(Place(0, n, 0, n * 0.01), 1, sensor, fan, ranges)
 
 
 def test_frames_are_read_as_they_were_written(page: Served, browser: Browser) -> None:
@@ -145,8 +145,8 @@ def test_frames_are_read_as_they_were_written(page: Served, browser: Browser) ->
     said = f"return document.querySelector('{legend}').textContent"
     browser.wait(f'(() => {{ {said} }})() === "what av0 sees is not known now"')
     send(page, 'scan:1:2', scan(2, ranges))
-    send(page, 'seen:1', encode_seen(0, 0, 0, 0.0, 1, [0, 1, 4]))
-    send(page, 'occupancy', encode_occupancy(0, 0, 0, 0.0, (-3.0, 8.5), 0.25, occupied))
+    send(page, 'seen:1', encode_seen(Place(0, 0, 0, 0.0), 1, [0, 1, 4]))
+    send(page, 'occupancy', encode_occupancy(Place(0, 0, 0, 0.0), (-3.0, 8.5), 0.25, occupied))
     browser.wait('crgame.store.perceived.occupancy && crgame.perception.fans === 1')
     read: dict[str, Any] = browser.run("""
         const { perceived } = crgame.store;
@@ -204,7 +204,7 @@ def test_thin_walls_are_seen_from_afar(page: Served, browser: Browser) -> None:
     occupied = np.zeros((200, 3000), dtype=bool)
     occupied[57] = True
     x0, y0 = 0.5 * (xmin + xmax) - 150.0, ymax + 20.0
-    send(page, 'occupancy', encode_occupancy(0, 0, 0, 0.0, (x0, y0), 0.1, occupied))
+    send(page, 'occupancy', encode_occupancy(Place(0, 0, 0, 0.0), (x0, y0), 0.1, occupied))
     browser.wait('crgame.perception.occupied === 3000')
     browser.run('crgame.world.fit(false);')
     browser.wait('!crgame.world.camera.moves')

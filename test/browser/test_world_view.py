@@ -92,15 +92,15 @@ def bonnet(run: RecordedRun, index: int) -> tuple[float, float]:
 def test_vehicles_and_ground_have_the_colours_of_the_theme(
         run: RecordedRun, page: Served, browser: Browser, scheme: str) -> None:
     browser.prefer(scheme)
+    x, y = map(float, run.states[0, 0, :2])
     browser.run('crgame.world.follow(null); crgame.world.camera.zoom(2);'
-                "crgame.world.centerOn('hv0')")
+                f'crgame.world.camera.lookAt({x}, {y}, false)')
     still(browser)
     for index, role in enumerate(('human', 'av')):
         assert pixel(browser, *bonnet(run, index)) == pytest.approx(
             theme(browser, role), abs=SAME_COLOR)
-    x, y = run.states[0, 0, :2]
     ground = theme(browser, 'map-ground')
-    assert pixel(browser, float(x) + 1.7, float(y) + 14.3) == pytest.approx(
+    assert pixel(browser, x + 1.7, y + 14.3) == pytest.approx(
         ground, abs=SAME_COLOR)
     assert (sum(ground) < 3 * 60) == (scheme == 'dark')
     assert browser.console_errors() == []

@@ -13,7 +13,13 @@ from typing import Any, Literal
 
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.client import Client
-from crgame_ros.cockpit.frames import encode_objects, encode_plan, encode_state, STATE_COLUMNS
+from crgame_ros.cockpit.frames import (
+    encode_objects,
+    encode_plan,
+    encode_state,
+    Place,
+    STATE_COLUMNS,
+)
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.page_messages import Command, Control, Rate
 from crgame_ros.cockpit.scene import scene_document
@@ -149,7 +155,7 @@ class RunBackend:
     def send_plan(self, vehicle: int, points: FloatArray) -> None:
         """Send a plan that begins now."""
         self.hub.send_frame(f'plan:{vehicle}', encode_plan(
-            self.epoch, self.n, 0, self.n * self.run.dt_s, vehicle, points))
+            Place(self.epoch, self.n, 0, self.n * self.run.dt_s), vehicle, points))
 
     async def _pump(self) -> None:
         due = time.perf_counter()
@@ -181,11 +187,12 @@ class RunBackend:
     def _frames(self, everything: bool = False) -> dict[str, bytes]:
         tick, rest = divmod(self.n, self.run.steps_per_tick)
         t = self.n * self.run.dt_s
-        frames = {'state': encode_state(self.epoch, self.n, tick, t, self.run.states[self.n])}
+        frames = {'state': encode_state(
+            Place(self.epoch, self.n, tick, t), self.run.states[self.n])}
         if rest == 0 or everything:
             n = tick * self.run.steps_per_tick
             frames['objects'] = encode_objects(
-                self.epoch, n, tick, n * self.run.dt_s, self.run.objects[tick])
+                Place(self.epoch, n, tick, n * self.run.dt_s), self.run.objects[tick])
         return frames
 
     def _status(self) -> None:

@@ -15,12 +15,12 @@ from typing import Any, Literal
 from aiohttp import ClientSession, ClientWebSocketResponse, CookieJar, WSMsgType
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.client import Client
-from crgame_ros.cockpit.frames import encode_state
+from crgame_ros.cockpit.frames import encode_state, Place
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.page_messages import Command, Trigger
 from crgame_ros.cockpit.server import create_app, HUB, listen
-from crgame_ros.errors import InputError
+from crgame_ros.errors import CrgameError, InputError
 import numpy as np
 import pytest
 
@@ -44,6 +44,8 @@ class PumpBackend:
         self.present: list[str] = []
         self.gone: list[str] = []
         self.games: list[Path] = []
+        # Why it loads no game; empty if it does.
+        self.load_refusal = ''
         self.pumped = 0
         self.stopped = False
         self.held = asyncio.Event()
@@ -82,13 +84,15 @@ class PumpBackend:
     async def load_game(self, path: Path, client: Client | None = None, *,
                         takes_seat: bool = False) -> str:
         self.games.append(path)
+        if self.load_refusal:
+            raise CrgameError(self.load_refusal)
         return 'loaded'
 
     async def _pump(self, hub: Hub) -> None:
         while True:
             self.pumped += 1
             hub.send_frame('state', self._frame or encode_state(
-                0, self.pumped, 0, 0.01 * self.pumped, np.zeros((2, 13))))
+                Place(0, self.pumped, 0, 0.01 * self.pumped), np.zeros((2, 13))))
             await asyncio.sleep(self._period_s)
 
 

@@ -104,6 +104,8 @@ def happenings(log_ns: int = START) -> list[Message]:
     text('/scenario/signals', 0, {'k': 0, 'states': {'7': 'red'}})
     text('/scenario/signals', 300, {'k': 30, 'states': {'7': 'green'}})
     text('/seats', 0, {'hv0': {'source': 'game', 'driver': 'idle'}})
+    text('/seats', 950, {'hv0': {'source': 'cockpit', 'driver': 'idle', 'here': True,
+                                 'person': {'id': 'p1', 'name': 'Ada'}}})
     text('/scenario/events', 0, {'epoch': 0, 'fired': []})
     text('/scenario/events', 610, {'epoch': 0, 'fired': [
         {'name': 'barrier', 'n': 610, 'k': 61, 'by': 'trigger'}]})

@@ -22,7 +22,7 @@ from crgame_ros.cockpit.access import Access, reachable_addresses
 from crgame_ros.cockpit.exposure import Exposure, fingerprint, make_certificate, tls_context
 from crgame_ros.cockpit.rights import Invitations, Rights
 from crgame_ros.cockpit.server import create_app, listen
-from crgame_ros.errors import InputError
+from crgame_ros.errors import CrgameError, InputError
 import pytest
 
 openssl = pytest.mark.skipif(shutil.which('openssl') is None, reason='openssl is not installed')
@@ -154,6 +154,15 @@ def test_links_outlive_the_cockpit_and_tell_no_secret(tmp_path: Path) -> None:
     for given, shown in ((token, None), (token, 'another'), ('none', cookie), ('\ud800', None)):
         with pytest.raises(InputError):
             again.exchange(given, shown)
+    # Once the file cannot be written, no link is used up or made.
+    token = again.make('watch')
+    (tmp_path / 'links.new').mkdir()
+    for attempt in (lambda: again.exchange(token, None), lambda: again.make('watch')):
+        with pytest.raises(CrgameError, match='cannot be written'):
+            attempt()
+    (tmp_path / 'links.new').rmdir()
+    assert again.rights(again.exchange(token, None)) == Rights(directs=False, drives=False)
+    assert len(json.loads(path.read_text())) == 2
     assert again.rights(None) is None and again.rights('none') is None
     path.write_text('{"a": 1}')
     with pytest.raises(InputError, match='is no list of links'):

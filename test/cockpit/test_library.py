@@ -183,6 +183,11 @@ async def test_uploads_and_nothing_else_are_deleted(tmp_path: Path) -> None:
         assert (await load(running, id=content['id']))[0] == 200
         status, answer = await delete(running, content['id'])
         assert status == 400 and 'of the present run' in answer['error']
+        # A game that the simulation refuses is not the present one.
+        running.backend.load_refusal = 'the simulation does not answer'
+        assert (await load(running, id=own))[0] == 400
+        assert (await delete(running, content['id']))[0] == 400
+        running.backend.load_refusal = ''
         assert (await load(running, id=own))[0] == 200
         assert (await delete(running, content['id']))[0] == 200
         assert (await listed(running))['folders'][1]['entries'] == []

@@ -267,7 +267,9 @@ def test_documents_hold_from_their_step_on(backend: ReplayBackend) -> None:
         (2.0, []), (4.53, ['o1']), (5.2, [])]
     assert [(t, content['av0']['stale']) for t, content in documents['planners']] == [
         (8.0, True), (9.0, False)]
-    assert documents['seats'][0][1] == {'seats': {'hv0': {'source': 'game', 'driver': 'idle'}}}
+    assert documents['seats'] == [[t, {'seats': {'hv0': {
+        'source': source, 'driver': 'idle', 'holder': None, 'holder_name': name}}}]
+        for t, source, name in ((0.0, 'game', None), (9.5, 'cockpit', 'Ada'))]
 
 
 def test_outline_is_every_fifth_state(backend: ReplayBackend) -> None:
@@ -291,6 +293,22 @@ def test_lost_states_are_marked(tmp_path: Path, parked: OfflineResult) -> None:
         assert [(e['n'], e['text']) for e in gaps] == [(299, '40 states were not recorded')]
         steps = [int(head[2]) for _, head, _ in read_frames(backend.chunk(0)).states]
         assert steps == [*range(300), *range(340, 500)]
+    finally:
+        backend.close()
+
+
+def test_recorder_that_was_restarted(tmp_path: Path, parked: OfflineResult) -> None:
+    """What it wrote after its restart is shown, too; a chunk in the gap has no states."""
+    messages = recorder.messages(parked)
+    record(tmp_path / 'bag', [m for m in messages if m[2] < START + 3_000_000_000])
+    record(tmp_path / 'bag_part2', [m for m in messages if m[2] >= START + 11_000_000_000])
+    backend = ReplayBackend(tmp_path)
+    try:
+        assert backend.info()['duration_s'] == DURATION_S
+        chunks = [backend.chunk(number) for number in range(3)]
+        assert not read_frames(chunks[1]).states
+        assert [int(head[2]) for _, head, _ in read_frames(*chunks).states] == [
+            *range(300), *range(1100, STEPS + 1)]
     finally:
         backend.close()
 

@@ -18,6 +18,7 @@ from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.runs.archive import run_id, RunArchive
 from crgame_ros.cockpit.runs.routes import add_run_routes
 from crgame_ros.cockpit.server import create_app, listen
+from crgame_ros.errors import InputError
 from crgame_ros.recording.run_record import read_run_record
 import pytest
 from replay_support import drive, PARKED, plans, record, recorder
@@ -162,6 +163,18 @@ async def test_only_runs_that_are_over_are_deleted_and_only_their_own_files(
     # Foreign files stay, as do the session and its other runs.
     assert [path.name for path in (session / 'run_2').iterdir()] == ['notes.txt']
     assert {path.name for path in session.iterdir()} == {'.started', 'run_2', 'run_3'}
+
+
+def test_runs_are_listed_again_only_for_one_that_is_not_known(tmp_path: Path, bag: Path) -> None:
+    session = make_run(tmp_path / 'now', bag)
+    archive = RunArchive(session)
+    first = archive.run(run_id(session))
+    assert archive.run(first.id) is first
+    later = make_run(session / 'run_2', bag)
+    assert archive.run(run_id(later)).folder == later
+    shutil.rmtree(later)
+    with pytest.raises(InputError, match='there is no such run'):
+        archive.run(run_id(later))
 
 
 @pytest.mark.exhaustive

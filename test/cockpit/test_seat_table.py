@@ -83,7 +83,7 @@ def _driven(person: str = 'p1', here: bool = True) -> dict[str, SeatEntry]:
 
 
 def test_a_seat_is_kept_for_an_absent_driver(table: SeatTable) -> None:
-    """For a minute only its driver and a director can claim it, then every client can."""
+    """For a minute only its driver and a director can claim it or give it back, then everyone."""
     seats = _driven(here=False)
     table.update(seats)
     table.note_absent({}, 100.0)
@@ -91,12 +91,15 @@ def test_a_seat_is_kept_for_an_absent_driver(table: SeatTable) -> None:
         'name': 'Ada', 'for_s': 50}
     with pytest.raises(InputError, match='the seat is kept for Ada; it is free in 50 s'):
         table.claim('c2', 'hv0', NAMES, person='p2', may_displace=False, now_s=110.0)
+    with pytest.raises(InputError, match='the seat is kept for Ada; it is free in 50 s'):
+        table.release('c2', 'hv0', person='p2', may_displace=False, now_s=110.0)
     assert table.seat_kept_for('p1') == 'hv0' and table.seat_kept_for('p2') is None
     for person, may, now_s in (('p1', False, 110.0), ('p2', True, 110.0),
                                ('p2', False, 100.0 + KEEP_S)):
         assert table.claim('c2', 'hv0', NAMES, person=person, may_displace=may,
                            now_s=now_s).person == person
         del table.held['hv0']
+        assert table.release('c2', 'hv0', person=person, may_displace=may, now_s=now_s) is None
 
 
 def test_two_cockpits_agree(table: SeatTable) -> None:

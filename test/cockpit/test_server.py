@@ -319,6 +319,8 @@ async def test_a_client_that_says_nothing_is_no_page() -> None:
         socket = await running.join()
         await next_text(socket, 'hello')
         running.hub.clients['c1'].heard_s -= hub.SILENT_S
+        # A pong is the browser's, not the page's.
+        await socket.pong()
         await wait_until(lambda: running.backend.gone == ['c1'], 'it to go')
         await socket.close()
 

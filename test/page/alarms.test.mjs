@@ -119,10 +119,13 @@ test('an acknowledged alarm stays as a word and frames no more, until it comes a
     assert.ok(chip('collision').classList.contains('known'));
     show(alarm('collision', 'av0', { since_t: 2 }));
     assert.equal(framed(), null);
-    show();
-    mock.timers.tick(4000);
-    show(alarm('collision', 'av0'));
-    assert.deepEqual(framed(), ['collision', 'urgent']);
+    for (const after_ms of [1000, 4000]) {
+      show();
+      mock.timers.tick(after_ms);
+      show(alarm('collision', 'av0'));
+      assert.deepEqual(framed(), ['collision', 'urgent'], `after ${after_ms} ms`);
+      await click(chip('collision'));
+    }
   });
 
 test('an alarm that has ended stays for 4 s, marked as such', () => {

@@ -230,12 +230,14 @@ test('each valid document is sent once, the status five times a second', () => {
   assert.equal(times('status'), 7, 'that it stands still is told at once');
 });
 
-test('this page holds no seat of a recorded run', () => {
-  const { store, shown } = documentsOf({ seats: [[0, { seats: {
-    hv0: { source: 'cockpit', driver: 'cockpit', holder: 'c1', holder_name: 'Ada' } } }]] });
-  shown.show(now(1), 0, true);
-  assert.deepEqual(store.seats.hv0, { source: 'cockpit', driver: 'cockpit', holder: null,
-    holder_name: '', requests: [], lost: false });
+test('who drove a seat of a recorded run is known by name', () => {
+  const driven = (holder_name) => ({ seats: {
+    hv0: { source: 'cockpit', driver: 'cockpit', holder: null, holder_name } } });
+  const { store, shown } = documentsOf({ seats: [[0, driven('Ada')], [2, driven('Bob')]] });
+  assert.deepEqual([1, 2, 0].map((t) => {
+    shown.show(now(t), 0, true);
+    return store.seats.hv0.holder_name;
+  }), ['Ada', 'Bob', 'Ada']);
 });
 
 test('after a jump the plots get the status of the last two minutes, then the present one',

@@ -56,6 +56,22 @@ test('the worst past value is the smallest, for decelerations the greatest', () 
   assert.equal(log.worst(0.2, 1, 'ttc'), null);
 });
 
+test('the worst follows the time in both directions, and steps that are added or dropped', () => {
+  const ttc = [5, 3, 4, 2, 6];
+  const log = logOf(0.35, ...ttc.slice(0, 4).map((value, i) => frame(10 * i,
+    row(0, { ttc: value }))));
+  const worst = (t) => log.worst(t, 0, 'ttc')?.value;
+  assert.deepEqual([0, 0.1, 0.2, 0.3, 0.2, 0, -1, 0.3].map(worst),
+    [5, 3, 3, 2, 3, 5, undefined, 2]);
+  // The first of four steps is dropped, then the worst of those left, then the last is repeated.
+  log.add(decodeFrame(frame(40, row(0, { ttc: 6 }))));
+  assert.deepEqual([worst(0.2), worst(0.4)], [3, 2]);
+  log.add(decodeFrame(frame(50, row(0, { ttc: 7 }))));
+  assert.deepEqual([worst(0.2), worst(0.5)], [4, 2]);
+  log.add(decodeFrame(frame(50, row(0, { ttc: 1 }))));
+  assert.equal(worst(0.5), 1);
+});
+
 test('a repeated step replaces all values from it on, and old values are dropped', () => {
   const log = logOf(0.15, ...[10, 20, 30, 20].map((n) => frame(n, row(0, { ttc: n }))));
   close(log.past(0, 'ttc').values, [20]);

@@ -256,7 +256,7 @@ test('preferences are kept under their own names, and an empty one is removed', 
   assert.equal(kept.has('crgame.theme'), false);
 });
 
-test('a browser without storage is no error', (t) => {
+test('where storage is forbidden, a preference lasts as long as the page', (t) => {
   const refuse = () => {
     throw new Error('forbidden');
   };
@@ -264,6 +264,7 @@ test('a browser without storage is no error', (t) => {
   t.after(() => Object.assign(page, { localStorage: before }));
   page.localStorage = { getItem: refuse, setItem: refuse, removeItem: refuse };
   remember('theme', 'dark');
+  assert.equal(recall('theme'), 'dark');
   remember('theme', '');
   assert.equal(recall('theme'), '');
 });

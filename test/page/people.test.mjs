@@ -5,7 +5,9 @@
 import assert from 'node:assert/strict';
 import { afterEach, beforeEach, mock, test } from 'node:test';
 
+import { NameField } from '../../page/cockpit/js/driving/name_field.js';
 import { createPeople } from '../../page/cockpit/js/people.js';
+import { createPerson } from '../../page/cockpit/js/person.js';
 import { click, liveStore, openPage, RIGHTS, Server, textOf } from './dom_support.mjs';
 
 const VEHICLES = [{ id: 'hv0', role: 'human' }, { id: 'hv1', role: 'human' },
@@ -68,7 +70,7 @@ const serve = (answer) => {
   const asked = [];
   mock.method(globalThis, 'fetch', async (path, options) => {
     asked.push([path, options]);
-    return { json: async () => answer() };
+    return { ok: true, text: async () => JSON.stringify(answer()) };
   });
   return asked;
 };
@@ -246,4 +248,25 @@ test('names of people and devices stay text', () => {
   assert.deepEqual(rows(), [`${name} driver in hv1`,
     '\u2068<i>wheel</i> \u202egfx\u2069 drives hv0 at the machine of the game']);
   assert.equal(root.querySelector('b, i'), null);
+});
+
+test('without storage, people join, are named and choose their role as ever', async () => {
+  for (const name of ['localStorage', 'sessionStorage']) {
+    const forbidden = { get() { throw new Error('SecurityError'); }, configurable: true };
+    Object.defineProperty(globalThis.window, name, forbidden);
+    Object.defineProperty(globalThis, name, forbidden);
+  }
+  const sent = [];
+  server.send = (message) => sent.push(message);
+  const { headers } = createPerson(root, store, server);
+  root.append(new NameField(store, server).node);
+  assert.deepEqual(sent, [{ type: 'person', key: headers['X-Crgame-Key'], fresh: true }]);
+  const field = root.querySelector('#my-name');
+  field.value = 'Anna';
+  field.dispatchEvent(new Event('change'));
+  assert.deepEqual(sent.at(-1), { type: 'name', name: 'Anna' });
+  rights({});
+  await choose('watch');
+  hello();
+  assert.deepEqual(server.take().map(({ role }) => role), ['watch', 'watch']);
 });

@@ -10,7 +10,7 @@ import { createRunList } from '../../page/cockpit/js/after/run_list.js';
 import { click, liveStore, openPage, send, textOf } from './dom_support.mjs';
 
 const run = (id, more = {}) => ({ id, name: `run/${id}`, title: `Title of ${id}`, scenario: 'ZAM',
-  began_ms: 1e12, duration_s: 12.34, contacts: 0, closed: true, finished: true, own: true,
+  began_ms: 1e12, duration_s: 12.34, contacts: 0, closed: true, finished: true,
   bytes: 1.26e6, files: [{ name: 'game.yaml', bytes: 20_000 }], ...more });
 const REPORT = { name: 'report.html', bytes: 5e6 };
 

@@ -78,6 +78,14 @@ test('an AV that its driver left can be given back to its planner', async () => 
   assert.deepEqual(server.take(), [{ type: 'release', seat: 'av0' }]);
 });
 
+test('while it is kept for its driver, only a director can give it back', () => {
+  const kept = { ...PLANNED, source: 'cockpit', kept: { name: 'Bob', for_s: 40 } };
+  show(FREE, kept);
+  assert.deepEqual(buttons('av0'), ['Take over', 'Give back']);
+  store.receive({ type: 'you', rights: RIGHTS.drive });
+  assert.deepEqual(buttons('av0'), ['Take over']);
+});
+
 test('a person without the right is told why, and asks nothing of the server', async () => {
   store.receive({ type: 'you', rights: RIGHTS.watch });
   show(FREE);

@@ -177,11 +177,11 @@ test('a preference is kept under the name of the page, and an empty one is forgo
   assert.deepEqual([recall('theme'), localStorage.getItem('crgame.theme')], ['', null]);
 });
 
-test('a browser that keeps nothing still has tabs', async () => {
+test('where nothing is kept, the panel shown last is known until the page closes', async () => {
   Object.defineProperty(globalThis.window, 'localStorage', {
     get() { throw new Error('SecurityError'); }, configurable: true });
   begin({ panel: 'timing' });
-  assert.deepEqual([recall('panel'), shown()], ['', ['drive']]);
+  assert.deepEqual([recall('panel'), shown()], ['timing', ['timing']]);
   await click(find('#tab-runs'));
   await click(find('#collapse'));
   assert.deepEqual([shown(), root.hidden], [['runs'], true]);

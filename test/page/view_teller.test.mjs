@@ -97,10 +97,16 @@ test('ten pictures a second are told, none while the clocks are not related', as
   assert.equal(sent.length, 10);
 });
 
-test('more than the server takes is cut off behind', async () => {
-  picture.contents = () => ({ eye: EYE, shown: Array.from({ length: 300 }, () => CAR) });
+test('of more than the server takes the nearest are told, the foremost first', async () => {
+  // Mirrors come first, and show cars that are farther away than those on the road ahead.
+  const cars = (count, distance_m, mirror) => Array.from({ length: count }, (_, i) => [
+    'vehicle', `o${i}`, 0.4, 0.5, 0.6, 0.7, distance_m + i, mirror]);
+  const [behind, ahead] = [cars(150, 200, 'mirror_left'), cars(150, 0, null)];
+  const glass = ['mirror', 'mirror_left', 0.1, 0.4, 0.3, 0.6, null, null];
+  picture.contents = () => ({ eye: EYE, shown: [...behind, glass, ...ahead] });
   teller.tell(0, picture, 'hv0');
   await soon();
   await soon();
-  assert.equal(sent[0].picture.shown.length, 200);
+  // Two instruments lie over the view.
+  assert.deepEqual(sent[0].picture.shown.slice(2), [...behind.slice(0, 47), glass, ...ahead]);
 });

@@ -9,7 +9,9 @@ import json
 from typing import Any
 
 from cockpit_graph import Graph, lived, OFFSET_NS
+from crgame_ros.cockpit.client import NOT_SEEN
 from crgame_ros.cockpit.page_messages import SeenView, Sound
+from crgame_ros.cockpit.rights import Rights
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import EVENTS, FiredEvents
 from crgame_ros.game.events import FiredEvent
@@ -226,6 +228,27 @@ def test_the_page_of_a_seat_alone_tells_what_its_view_shows(setup: Setup) -> Non
         assert (first, last) == ('first', 'last')
         # On a busy machine some of them are not hasty.
         assert len(hasty) <= took_s / LEAST_PICTURE_S
+    lived(check)
+
+
+def test_the_page_of_an_avs_rider_is_the_first_that_may_take_its_seat(setup: Setup) -> None:
+    """Spectators, drivers with a link for another seat and later pages tell no pictures of it."""
+    watched = replace(setup, game=replace(setup.game, instruments=InstrumentsSpec(
+        gaze=(GazeSpec('Eyes', 'av0'),))))
+    picture = {'seat': 'av0', 'epoch': 0, 'steady_s': 1.0, 'clock_error_ms': 0.5,
+               'place': [0, 0, 9, 9, 9, 9, 1], 'eye': [0, 0, 0, 1.2, 0, 1, 1], 'shown': []}
+
+    async def check(graph: Graph) -> None:
+        await graph.begin(watched)
+        pages = [graph.page() for _ in range(4)]
+        pages[0].rights = Rights.for_role('watch')
+        pages[1].rights = Rights.for_role('drive', 'hv0')
+        for page in pages:
+            page.view = NOT_SEEN.model_copy(update={'stage': 'av0'})
+        await graph.ask(pages[2], 'picture', picture=picture)
+        for page in (pages[0], pages[1], pages[3]):
+            with pytest.raises(InputError, match='not the page'):
+                await graph.ask(page, 'picture', picture=picture)
     lived(check)
 
 

@@ -80,6 +80,8 @@ class RunArchive:
     def __init__(self, session: Path, root: Path | None = None) -> None:
         self.session = session.resolve()
         self._root = None if root is None else root.resolve()
+        # As found last: it takes long to list hundreds of runs for each chunk of a replay.
+        self._known: dict[str, PastRun] = {}
         self._told: dict[tuple[Path, int], Mapping[str, object]] = {}
 
     def runs(self) -> dict[str, PastRun]:
@@ -94,6 +96,7 @@ class RunArchive:
             for folder in reversed(run_folders(session)):
                 if len(found) < MAX_RUNS and _is_run(folder):
                     found[run_id(folder)] = PastRun(run_id(folder), folder, session)
+        self._known = found
         return found
 
     def run(self, key: str) -> PastRun:
@@ -102,10 +105,12 @@ class RunArchive:
 
         :raises InputError: if there is none.
         """
-        try:
-            return self.runs()[key]
-        except KeyError:
-            raise InputError('there is no such run', 'id', 'load the page again') from None
+        run = self._known.get(key)
+        if run is None or not _is_run(run.folder):
+            run = self.runs().get(key)
+        if run is None:
+            raise InputError('there is no such run', 'id', 'load the page again')
+        return run
 
     def listing(self) -> dict[str, object]:
         """Return the answer of /api/runs."""
@@ -134,7 +139,6 @@ class RunArchive:
         files = run.files()
         return {'id': run.id, 'name': run.name, **self._facts(run),
                 'finished': run.is_finished, 'closed': run.is_closed,
-                'own': run.session == self.session,
                 'bytes': sum(_size(path) for path in files.values()),
                 'files': [{'name': name, 'bytes': _size(path)} for name, path in files.items()]}
 

@@ -8,15 +8,13 @@ from collections.abc import AsyncIterator, Iterator, Mapping
 from dataclasses import dataclass
 import hashlib
 import json
-import os
 from pathlib import Path
-import sys
 from urllib.parse import quote
 import zipfile
 
 from aiohttp import ClientError, ClientSession, hdrs, web, WSMsgType
 from crgame_ros.cockpit.access import cookie_for, cookie_name, new_token
-from crgame_ros.cockpit.job_process import JobProcess
+from crgame_ros.cockpit.job_process import JobProcess, start_module
 from crgame_ros.cockpit.library_routes import (
     Answer,
     asked_id,
@@ -34,7 +32,6 @@ MOST_REPLAYS = 3
 BEGIN_S = 60.0
 # The headers of an answer that the page needs; the server sets the others.
 _PASSED = (hdrs.CONTENT_TYPE, hdrs.CONTENT_ENCODING)
-_PACKAGES = Path(__file__).resolve().parents[3]
 _CHUNK_BYTES = 256 * 1024
 READER = 'crgame_ros.cockpit.runs.jobs'
 READ_S = 120.0
@@ -115,11 +112,7 @@ class RunReplays:
 
 
 async def _start(run: PastRun) -> _Replay:
-    paths = [str(_PACKAGES), *filter(None, [os.environ.get('PYTHONPATH')])]
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, '-P', '-m', PROCESS, str(run.bag), stdin=asyncio.subprocess.PIPE,
-        stdout=asyncio.subprocess.PIPE, env={**os.environ, 'PYTHONPATH': os.pathsep.join(paths)},
-        start_new_session=True)
+    process = await start_module(PROCESS, str(run.bag), own_session=True)
     token = new_token()
     assert process.stdin is not None and process.stdout is not None
     try:
@@ -281,7 +274,7 @@ class RunRoutes:
 
     async def picture(self, request: web.Request) -> web.StreamResponse:
         """Return a picture of a run, which is drawn once."""
-        run = await self._closed(request)
+        run = await self._closed(_asked(request))
         path = run.folder / PICTURE
         if not path.is_file():
             await self._painter.run('picture', path=str(run.bag), out=str(path),
@@ -291,7 +284,7 @@ class RunRoutes:
 
     async def score(self, request: web.Request) -> web.Response:
         """Return the scores of the driven vehicles in a run."""
-        run = await self._closed(request)
+        run = await self._closed(_asked(request))
         if run.id not in self._scores:
             answer = await self._scorer.run('score', path=str(run.bag),
                                             unwanted=asker_gone(request))
@@ -302,7 +295,7 @@ class RunRoutes:
 
     async def file(self, request: web.Request) -> web.StreamResponse:
         """Send one file of a run; the report is shown, other files are downloaded."""
-        run = await self._run(request)
+        run = await asyncio.to_thread(self._archive.run, _asked(request))
         name = request.query.get('file', '')[:MAX_TEXT]
         path = run.files().get(name)
         if path is None:
@@ -316,7 +309,7 @@ class RunRoutes:
 
     async def zip(self, request: web.Request) -> web.StreamResponse:  # noqa: A003
         """Send all files of a run as one archive."""
-        run = await self._closed(request)
+        run = await self._closed(_asked(request))
         name = run.name.replace('/', '_')
         response = web.StreamResponse(headers={
             hdrs.CONTENT_TYPE: 'application/zip',
@@ -335,8 +328,7 @@ class RunRoutes:
         keys = request.query.get('ids', '')[:MAX_TEXT].split(',')
         if not 2 <= len(keys) <= MOST_COMPARED or len(set(keys)) != len(keys):
             raise InputError(f'choose 2 to {MOST_COMPARED} runs', 'comparison')
-        known = await asyncio.to_thread(self._archive.runs)
-        runs = [_readable(known.get(key)) for key in keys]
+        runs = [await self._closed(key) for key in keys]
         name = hashlib.sha256(','.join(keys).encode()).hexdigest()[:16]
         path = self._work / 'comparisons' / f'{name}.html'
         if not path.is_file():
@@ -356,24 +348,18 @@ class RunRoutes:
 
     async def replay(self, request: web.Request) -> web.StreamResponse:
         """Forward a request to the process that shows a run."""
-        known = await asyncio.to_thread(self._archive.runs)
-        run = _readable(known.get(request.match_info['run']))
+        run = await self._closed(request.match_info['run'])
         return await self._replays.forward(run, request.match_info['rest'], request)
 
-    async def _run(self, request: web.Request) -> PastRun:
-        return await asyncio.to_thread(self._archive.run,
-                                       request.query.get('id', '')[:MAX_TEXT])
+    async def _closed(self, key: str) -> PastRun:
+        run = await asyncio.to_thread(self._archive.run, key)
+        if not run.is_closed:
+            raise InputError('is being recorded', run.name, 'wait until its run is over')
+        return run
 
-    async def _closed(self, request: web.Request) -> PastRun:
-        return _readable(await self._run(request))
 
-
-def _readable(run: PastRun | None) -> PastRun:
-    if run is None:
-        raise InputError('there is no such run', 'id', 'load the page again')
-    if not run.is_closed:
-        raise InputError('is being recorded', run.name, 'wait until its run is over')
-    return run
+def _asked(request: web.Request) -> str:
+    return request.query.get('id', '')[:MAX_TEXT]
 
 
 def _attachment(name: str) -> str:

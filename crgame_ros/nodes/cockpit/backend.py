@@ -196,10 +196,14 @@ class LiveBackend:
                 self._pages(), self._feed.scenario.game.scheduler.stamp_ns(self._feed.n))
 
     def _pages(self) -> dict[str, Client]:
-        """Return the page of each seat: its holder's, or that of who rides in an AV."""
+        """Return the page of each seat: its holder's, or that of who first rides in an AV."""
         held, clients = self._desk.table.held, self._hub.clients
-        pages = {client.view.stage: client for client in clients.values() if client.view.stage}
-        return pages | {seat: clients[each.holder] for seat, each in held.items()
+        riders: dict[str, Client] = {}
+        for client in clients.values():
+            stage, rights = client.view.stage, client.rights
+            if stage and rights.drives and rights.seat in ('', stage):
+                riders.setdefault(stage, client)
+        return riders | {seat: clients[each.holder] for seat, each in held.items()
                         if each.holder in clients}
 
     def _seat_who_chose(self) -> None:

@@ -222,6 +222,8 @@ class CockpitFeed:
         self._told = ('', 0)
         self._pace: tuple[float, int] = (0.0, 0)
         self._measured_factor: float | None = None
+        # Of the last run whose files pages know to be complete.
+        self._filed_epoch: int | None = None
 
     @property
     def t(self) -> float:
@@ -404,8 +406,12 @@ class CockpitFeed:
             'k': game.scheduler.k(self.n), 'epoch': game.epoch,
             'measured_factor': self._measured_factor, 'frames_skipped': self.frames_skipped,
             'clients': len(self._hub.clients)})
-        if self.status.run == 'ended' and self._runs is not None:
-            self._hub.set_document('files', files_document(self._runs, game.epoch))
+        if self.status.run == 'ended' and self._runs is not None \
+                and self._filed_epoch != game.epoch:
+            files = files_document(self._runs, game.epoch)
+            self._hub.set_document('files', files)
+            if files['complete']:
+                self._filed_epoch = game.epoch
         self._hub.set_document('alarms', self.status.alarms_document())
 
 

@@ -302,7 +302,8 @@ class SeatDesk:
         self._order(SeatDemand(held.id, COCKPIT, person, displaced))
 
     def _release(self, client: Client, seat: str) -> None:
-        held = self.table.release(client.id, seat)
+        held = self.table.release(client.id, seat, person=client.person,
+                                  may_displace=client.rights.directs, now_s=time.monotonic())
         if held is not None:
             self._publish_hands_off(held)
         self._told.pop(seat, None)

@@ -19,7 +19,6 @@ export interface PastRun {
   contacts: number | null; // null if unknown
   closed: boolean; // whether it can be read
   finished: boolean; // whether it can be deleted
-  own: boolean; // whether it belongs to this session
   bytes: number;
   files: { name: string; bytes: number }[];
 }

@@ -15,9 +15,10 @@ export type Limits = Record<string, number>; // by measure
 /** The most critical values of each vehicle over time. */
 export class CriticalityLog {
   #frames: CriticalityFrame[] = [];
+  // The worst of the first frames, by vehicle and measure: most calls ask for a few more.
+  #worsts = new Map<string, { count: number; worst: Worst | null }>();
   #keeps_s;
   #fetch: (() => void) | null;
-
   #measures;
 
   /**
@@ -41,6 +42,7 @@ export class CriticalityLog {
   /** Remove all frames. */
   clear() {
     this.#frames = [];
+    this.#worsts.clear();
   }
 
   /** Return how many steps are stored. */
@@ -52,10 +54,22 @@ export class CriticalityLog {
   add(frame: CriticalityFrame) {
     while ((this.#frames.at(-1)?.n ?? -1) >= frame.n) {
       this.#frames.pop();
+      this.#worsts.clear();
     }
     this.#frames.push(frame);
     if (this.#frames[0].t < frame.t - this.#keeps_s) {
+      this.#forget(this.#frames[0].t);
       this.#frames.shift();
+    }
+  }
+
+  /** @param t of the first frame, which is dropped [s] */
+  #forget(t: number) {
+    for (const [key, known] of this.#worsts) {
+      known.count -= 1;
+      if (known.count < 0 || known.worst?.t === t) {
+        this.#worsts.delete(key);
+      }
     }
   }
 
@@ -80,8 +94,7 @@ export class CriticalityLog {
    * @returns null if nothing is near, or no measurement is recent
    */
   at(t: number, index: number, name: string): Critical | null {
-    const count = countWhile(this.#frames.length, (i) => this.#frames[i].t <= t + 1e-9);
-    const frame = this.#frames[count - 1];
+    const frame = this.#frames[this.#countUntil(t) - 1];
     return frame === undefined || t - frame.t > 1 ? null : this.#critical(frame, index, name);
   }
 
@@ -94,14 +107,25 @@ export class CriticalityLog {
    */
   worst(t: number, index: number, name: string): Worst | null {
     const sense = this.#measures().find((each) => each.name === name)?.worst ?? -1;
-    let worst: Worst | null = null;
-    for (const frame of this.#frames) {
-      const found = frame.t <= t + 1e-9 ? this.#critical(frame, index, name) : null;
+    const count = this.#countUntil(t);
+    const key = `${index} ${name}`;
+    const known = this.#worsts.get(key);
+    let { count: done, worst } = known !== undefined && known.count <= count ? known
+      : { count: 0, worst: null };
+    for (; done < count; done += 1) {
+      const frame = this.#frames[done];
+      const found = this.#critical(frame, index, name);
       if (found !== null && (worst === null || sense * (found.value - worst.value) > 0)) {
         worst = { ...found, t: frame.t };
       }
     }
+    this.#worsts.set(key, { count, worst });
     return worst;
+  }
+
+  /** @returns how many frames there are until a time */
+  #countUntil(t: number) {
+    return countWhile(this.#frames.length, (i) => this.#frames[i].t <= t + 1e-9);
   }
 
   /** @param index of the vehicle */

@@ -3,10 +3,9 @@
 /**
  * Types of the JSON messages between the page and its server: no code here.
  *
- * The server's side is crgame_ros/cockpit/scene.py (with map_lanelets.py and
- * road_furniture.py), run_status.py, seat_table.py, runs/archive.py,
- * replay_backend.py and, for the page's messages, page_messages.py. The binary frames
- * are in frames.ts. Polylines and polygons are flat lists x0, y0, x1, y1, … [m].
+ * The server's side is crgame_ros/cockpit/scene.py, run_status.py, seat_table.py,
+ * runs/archive.py, replay_backend.py and, for the page's messages, page_messages.py. The
+ * binary frames are in frames.ts. Polylines and polygons are flat lists x0, y0, x1, y1, … [m].
  */
 
 import type { Control, Input, PageMessage, Role, SeenView, Unnumbered } from './page_messages.js';

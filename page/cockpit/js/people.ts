@@ -4,6 +4,8 @@
 
 import { element, setAttribute, setText } from './dom.js';
 import { oneLine } from './panels/format.js';
+import { session } from './panels/memory.js';
+import { post } from './panels/scenario_api.js';
 
 import type { Connection } from './connection.js';
 import type { DeviceDelay, Present } from './people_messages.js';
@@ -94,13 +96,13 @@ class People {
   #choose() {
     // A select that keeps the focus would take the driving keys.
     this.#role.blur();
-    sessionStorage.setItem(ROLE, this.#role.value);
+    session.set(ROLE, this.#role.value);
     this.#requestRole(this.#role.value as RoleName);
   }
 
   /** Restore the chosen role: a new connection begins with all granted rights. */
   #chooseAgain() {
-    const role = sessionStorage.getItem(ROLE)
+    const role = session.get(ROLE)
       ?? new URLSearchParams(window.location.search).get('role');
     if (this.#store.me.id !== '' && this.#store.mode === 'live' && role !== this.#refused
         && ROLES.some(([known]) => known === role)) {
@@ -119,19 +121,15 @@ class People {
   async #makeLink(event: Event) {
     event.preventDefault();
     const [role, seat = ''] = this.#whom.value.split(' ');
-    let answer;
+    let [link, refusal] = ['', ''];
     try {
-      const response = await fetch('/api/invite', { method: 'POST', credentials: 'same-origin',
-        headers: { 'X-Crgame': '1', 'Content-Type': 'application/json',
-          ...window.crgame?.person?.headers },
-        body: JSON.stringify({ role, seat }) });
-      answer = await response.json();
-    } catch {
-      answer = { error: 'The server does not answer.' };
+      ({ link } = await post<{ link: string }>('/api/invite', { role, seat }));
+    } catch (error) {
+      refusal = (error as Error).message;
     }
-    setText(this.#error, answer.error ?? '');
-    setAttribute(this.#link, 'hidden', !answer.link);
-    this.#link.value = answer.link ?? '';
+    setText(this.#error, refusal);
+    setAttribute(this.#link, 'hidden', link === '');
+    this.#link.value = link;
     this.#link.select();
   }
 }

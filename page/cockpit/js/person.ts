@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The key of this page, by which the server recognises it after a lost connection. */
 
+import { local, session } from './panels/memory.js';
+
 import type { Connection } from './connection.js';
 import type { Store } from './store.js';
 
@@ -13,8 +15,8 @@ class Person {
   // The address of a stage may carry the key of its driver, whatever the browser.
   #given = givenKey();
   // The key of an earlier tab: if another open tab has it, that tab keeps it.
-  #fresh = this.#given === null && sessionStorage.getItem(KEY) === null;
-  #key = this.#given ?? sessionStorage.getItem(KEY) ?? localStorage.getItem(KEY) ?? newKey();
+  #fresh = this.#given === null && session.get(KEY) === null;
+  #key = this.#given ?? session.get(KEY) ?? local.get(KEY) ?? newKey();
 
   constructor(store: Store, connection: Connection) {
     this.#connection = connection;
@@ -32,9 +34,9 @@ class Person {
 
   #introduce() {
     if (this.#given === null) {
-      sessionStorage.setItem(KEY, this.#key);
-      if (localStorage.getItem(KEY) === null) {
-        localStorage.setItem(KEY, this.#key);
+      session.set(KEY, this.#key);
+      if (local.get(KEY) === null) {
+        local.set(KEY, this.#key);
       }
     }
     this.#connection.send({ type: 'person', key: this.#key, fresh: this.#fresh });

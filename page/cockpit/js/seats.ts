@@ -94,7 +94,7 @@ class Seats {
   }
 
   #facts(id: string): Facts {
-    const { seats, scene, me, status } = this.#store;
+    const { seats, scene, me, status, rights } = this.#store;
     const connected = this.#store.connected && !this.#stale;
     const seat = seats[id];
     const role = scene?.vehicles.find((vehicle) => vehicle.id === id)?.role ?? 'human';
@@ -102,7 +102,8 @@ class Seats {
       id, role, connected, mine: connected && seat.holder === me.id && me.id !== '',
       holder: seat.holder,
       // A seat that the game assigns to a cockpit cannot be given back to another driver.
-      left: seat.holder === null && seat.source === 'cockpit' && seat.driver !== 'cockpit',
+      left: seat.holder === null && seat.source === 'cockpit' && seat.driver !== 'cockpit'
+        && (!seat.kept || rights.directs),
       requests: seat.requests ?? [],
       others: seat.others ?? [],
       asked: (seat.requests ?? []).some(({ client }) => client === me.id),

@@ -9,6 +9,7 @@ import {
   loadProfile, pedalValue, sampleOf, saveProfile, steeringValue,
 } from '../../cockpit/js/driving/gamepad_profile.js';
 import { ACTIONS } from '../../cockpit/js/driving/keyboard.js';
+import { local } from '../../cockpit/js/panels/memory.js';
 import { button } from './page_view.js';
 
 import type { DeviceDocument } from './desk_messages.js';
@@ -31,8 +32,8 @@ const KEYBOARD = 'keyboard';
  * @returns JSON of a profile, by the device's name
  */
 export function calibrations(): Record<string, string> {
-  return Object.fromEntries(Object.entries(localStorage).filter(([key]) => key.startsWith(PREFIX))
-    .map(([key, value]) => [key.slice(PREFIX.length), value]));
+  return Object.fromEntries(local.keys(PREFIX).map(
+    (key) => [key.slice(PREFIX.length), local.get(key) ?? '']));
 }
 
 /** The check, until it is left. */

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Answers that are not on the server yet, stored so that a reload loses nothing. */
 
+import { session } from '../../cockpit/js/panels/memory.js';
+
 import type { Answer, DeskDocument } from './desk_messages.js';
 
 const PREFIX = 'crgame.draft.';
@@ -57,11 +59,7 @@ export class Draft {
   }
 
   #write() {
-    try {
-      sessionStorage.setItem(this.#key, JSON.stringify(this.#state));
-    } catch {
-      // A full or forbidden storage: a reload then asks again.
-    }
+    session.set(this.#key, JSON.stringify(this.#state));
   }
 }
 
@@ -76,16 +74,13 @@ export function draftName({ study, participant, item, again }: DeskDocument) {
  * @param name of the one that stays
  */
 export function forgetOtherDrafts(name: string) {
-  for (const key of Object.keys(sessionStorage)) {
-    if (key.startsWith(PREFIX) && key !== PREFIX + name) {
-      sessionStorage.removeItem(key);
-    }
-  }
+  session.keys(PREFIX).filter((key) => key !== PREFIX + name)
+    .forEach((key) => session.remove(key));
 }
 
 function read(key: string): DraftState | null {
   try {
-    const state = JSON.parse(sessionStorage.getItem(key) ?? 'null');
+    const state = JSON.parse(session.get(key) ?? 'null');
     return Number.isFinite(state?.shown_at) && state.answers && state.after_s ? state : null;
   } catch {
     return null;

@@ -3,6 +3,7 @@
 /** The experimenter's page, which shows the session's state and sends orders. */
 
 import { element, part, setAttribute, setText } from '../../cockpit/js/dom.js';
+import { local } from '../../cockpit/js/panels/memory.js';
 import { DeskConnection } from './desk_connection.js';
 import { doubtWords, kindWords, stateWords } from './item_words.js';
 import { entryWords, timeOfDay } from './log_words.js';
@@ -31,7 +32,7 @@ class ExperimenterPage {
   #connection = new DeskConnection<Received>('/ws/experimenter', {
     opened: () => {
       part(document.body, 'lost').hidden = true;
-      this.#ask(localStorage.getItem(LANGUAGE_KEY) ?? navigator.language.split('-')[0]);
+      this.#ask(local.get(LANGUAGE_KEY) ?? navigator.language.split('-')[0]);
     },
     lost: () => {
       const lost = part(document.body, 'lost');
@@ -57,7 +58,7 @@ class ExperimenterPage {
     }
     const language = part(document.body, 'language') as HTMLSelectElement;
     language.addEventListener('change', () => {
-      localStorage.setItem(LANGUAGE_KEY, language.value);
+      local.set(LANGUAGE_KEY, language.value);
       this.#ask(language.value);
     });
     const note = part(document.body, 'note') as HTMLTextAreaElement;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Requests to the server about past runs; every refusal becomes an Error with one line. */
 
-import { ask, OWN } from '../panels/scenario_api.js';
+import { ask, post } from '../panels/scenario_api.js';
 import { oneLine } from '../panels/format.js';
 
 import type { PastRun, Score } from '../api_messages.js';
@@ -23,10 +23,7 @@ export function fetchScore(id: string): Promise<Score> {
  * @returns what was done
  */
 export async function deleteRun(id: string): Promise<string> {
-  const reply = await ask<Reply>('/api/runs/delete', {
-    method: 'POST', body: JSON.stringify({ id }),
-    headers: { ...OWN, 'Content-Type': 'application/json' },
-  });
+  const reply = await post<Reply>('/api/runs/delete', { id });
   return oneLine(reply.text);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 import { LIGHT_BUTTONS } from '../lights.js';
+import { local } from '../panels/memory.js';
 
 // The mapping of a gamepad's or wheel's axes and buttons to functions, with their ranges.
 /**
@@ -110,7 +111,7 @@ function pedalAxes(pad: Gamepad) {
 
 /** Load the calibrated mapping of a device, or its default. */
 export function loadProfile(pad: Gamepad): { profile: Profile; calibrated: boolean } {
-  const text = localStorage.getItem(PREFIX + pad.id);
+  const text = local.get(PREFIX + pad.id);
   if (text !== null) {
     try {
       const profile = JSON.parse(text);
@@ -136,9 +137,9 @@ export function loadProfile(pad: Gamepad): { profile: Profile; calibrated: boole
  */
 export function saveProfile(id: string, profile: Profile | null) {
   if (profile === null) {
-    localStorage.removeItem(PREFIX + id);
+    local.remove(PREFIX + id);
   } else {
-    localStorage.setItem(PREFIX + id, JSON.stringify(profile));
+    local.set(PREFIX + id, JSON.stringify(profile));
   }
 }
 

@@ -3,6 +3,7 @@
 /** The field with the name that others see; kept in this browser. */
 
 import { element } from '../dom.js';
+import { local } from '../panels/memory.js';
 
 import type { Connection } from '../connection.js';
 import type { Store } from '../store.js';
@@ -38,7 +39,7 @@ export class NameField {
     if (this.#store.me.id === '') {
       return;
     }
-    const kept = localStorage.getItem(KEY);
+    const kept = local.get(KEY);
     if (kept) {
       this.#connection.send({ type: 'name', name: kept });
     }
@@ -54,7 +55,7 @@ export class NameField {
       return;
     }
     this.#store.me.name = name;
-    localStorage.setItem(KEY, name);
+    local.set(KEY, name);
     this.#connection.send({ type: 'name', name });
   }
 }

@@ -73,7 +73,8 @@ export function createAlarms(root: HTMLElement, store: Store): { kinds: () => st
         });
       }
       clearTimeout(entry.timer);
-      Object.assign(entry, alarm, { ended: false, mine: concerns(alarm, store) });
+      Object.assign(entry, alarm, { known: entry.known && !entry.ended, ended: false,
+        mine: concerns(alarm, store) });
       describe(entry, store.scene);
     }
     const ids = new Set(active.map((alarm) => alarm.id));

@@ -1,20 +1,66 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Preferences that the page keeps on this machine between visits; nothing about a run. */
+/** What a page keeps in the browser: its preferences, and what identifies it; nothing of a run. */
 
 const PREFIX = 'crgame.';
 
+/** A storage of the browser; where it is forbidden or full, it lasts as long as the page. */
+class Memory {
+  #name;
+  #spare = new Map<string, string>();
+
+  constructor(name: 'localStorage' | 'sessionStorage') {
+    this.#name = name;
+  }
+
+  /** @returns null if nothing is kept */
+  get(key: string): string | null {
+    return this.#spare.get(key) ?? this.#try((storage) => storage.getItem(key)) ?? null;
+  }
+
+  set(key: string, value: string) {
+    if (this.#try((storage) => {
+      storage.setItem(key, value);
+      return true;
+    })) {
+      this.#spare.delete(key);
+    } else {
+      this.#spare.set(key, value);
+    }
+  }
+
+  remove(key: string) {
+    this.#spare.delete(key);
+    this.#try((storage) => storage.removeItem(key));
+  }
+
+  /** @returns the names that begin with a prefix */
+  keys(prefix: string): string[] {
+    const kept = [...this.#try((storage) => Object.keys(storage)) ?? [], ...this.#spare.keys()];
+    return kept.filter((key) => key.startsWith(prefix));
+  }
+
+  #try<T>(use: (storage: Storage) => T): T | undefined {
+    try {
+      // Where storage is forbidden, its name alone throws.
+      return use(window[this.#name]);
+    } catch {
+      return undefined;
+    }
+  }
+}
+
+/** Kept between visits. */
+export const local = new Memory('localStorage');
+/** Kept as long as the tab lives. */
+export const session = new Memory('sessionStorage');
+
 /**
  * @param name of a preference
- * @returns its value; empty if none was kept or the browser keeps nothing
+ * @returns its value; empty if none was kept
  */
 export function recall(name: string): string {
-  try {
-    return window.localStorage.getItem(PREFIX + name) ?? '';
-  } catch {
-    // Storage may be forbidden in the browser: each visit then begins with the defaults.
-    return '';
-  }
+  return local.get(PREFIX + name) ?? '';
 }
 
 /**
@@ -22,13 +68,9 @@ export function recall(name: string): string {
  * @param value to keep; an empty one forgets it
  */
 export function remember(name: string, value: string) {
-  try {
-    if (value === '') {
-      window.localStorage.removeItem(PREFIX + name);
-    } else {
-      window.localStorage.setItem(PREFIX + name, value);
-    }
-  } catch {
-    // As above: a preference that cannot be kept lasts until the page is closed.
+  if (value === '') {
+    local.remove(PREFIX + name);
+  } else {
+    local.set(PREFIX + name, value);
   }
 }

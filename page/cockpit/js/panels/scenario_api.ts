@@ -7,12 +7,12 @@ import { oneLine } from './format.js';
 import type { Choice, Offer, PlannerOption, Preview } from '../api_messages.js';
 import type { Reply } from '../messages.js';
 
-/** Header of all requests that change something: a page of another site cannot add it. */
-export const OWN = { 'X-Crgame': '1' };
-
-/** Return the header with this page's key, so that others see who did it. */
+/**
+ * Return the headers of requests that change something. A page of another site cannot add the
+ * first; the other is this page's key, so that others see who did it.
+ */
 function own() {
-  return { ...OWN, ...window.crgame?.person?.headers };
+  return { 'X-Crgame': '1', ...window.crgame?.person?.headers };
 }
 
 export function fetchScenarios(): Promise<Offer> {
@@ -50,10 +50,7 @@ export async function upload(file: File): Promise<string> {
  * @returns what was done
  */
 export async function deleteUpload(id: string): Promise<string> {
-  const reply = await ask<Reply>('/api/upload/delete', {
-    method: 'POST', body: JSON.stringify({ id }),
-    headers: { ...OWN, 'Content-Type': 'application/json' },
-  });
+  const reply = await post<Reply>('/api/upload/delete', { id });
   return oneLine(reply.text);
 }
 
@@ -62,11 +59,19 @@ export async function deleteUpload(id: string): Promise<string> {
  * @returns what was done
  */
 export async function load(choice: Choice): Promise<string> {
-  const reply = await ask<Reply>('/api/load', {
-    method: 'POST', body: JSON.stringify(choice),
-    headers: { ...own(), 'Content-Type': 'application/json' },
-  });
+  const reply = await post<Reply>('/api/load', choice);
   return oneLine(reply.text);
+}
+
+/**
+ * Send the server JSON.
+ *
+ * @returns as `ask`
+ * @throws {Error} with one readable line
+ */
+export function post<Content>(path: string, content: unknown): Promise<Content> {
+  return ask(path, { method: 'POST', body: JSON.stringify(content),
+    headers: { ...own(), 'Content-Type': 'application/json' } });
 }
 
 /**

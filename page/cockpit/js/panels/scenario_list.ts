@@ -65,11 +65,6 @@ export class ScenarioList {
     this.#entries.get(id)?.button.scrollIntoView({ block: 'nearest' });
   }
 
-  /** @returns the entry with it */
-  entry(id: string): Entry | undefined {
-    return this.#entries.get(id)?.entry;
-  }
-
   /** The games, in the order of the list. */
   get games() {
     return [...this.#entries.values()].map(({ entry }) => entry).filter(isGame);

@@ -4,7 +4,7 @@
 
 import { countWhile } from '../search.js';
 
-import type { RunState, SeatsMessage, Status, StoreMessage } from '../messages.js';
+import type { RunState, Status, StoreMessage } from '../messages.js';
 import type { ReplayInfo, ReplayTracks } from '../replay_messages.js';
 import type { Store } from '../store.js';
 
@@ -53,9 +53,7 @@ export class ReplayDocuments {
       if (this.#shown[kind] !== place) {
         this.#shown[kind] = place;
         const content = this.#info.documents[kind]?.[place]?.[1] ?? EMPTY[kind];
-        this.#store.receive({
-          type: kind, ...('seats' in content ? withoutHolders(content) : content),
-        } as StoreMessage);
+        this.#store.receive({ type: kind, ...content } as StoreMessage);
       }
     }
     if (jumped || now.run !== this.#run || now_ms - this.#told_ms >= STATUS_MS) {
@@ -102,10 +100,4 @@ export class ReplayDocuments {
     const track = this.#info.documents[kind] ?? [];
     return countWhile(track.length, (index) => track[index][0] <= t + 1e-9) - 1;
   }
-}
-
-/** Return the seats without holders: no client of this page held one in the recorded run. */
-function withoutHolders({ seats }: Omit<SeatsMessage, 'type'>) {
-  return { seats: Object.fromEntries(Object.entries(seats).map(([id, seat]) => [
-    id, { ...seat, holder: null, holder_name: '', requests: [], lost: false }])) };
 }

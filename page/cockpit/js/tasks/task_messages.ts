@@ -7,6 +7,8 @@
  * the page's messages, crgame_ros/cockpit/page_messages.py.
  */
 
+import type { TaskDone } from '../page_messages.js';
+
 /** A task of the game. */
 export interface GameTask {
   name: string;
@@ -32,20 +34,6 @@ export interface OpenPrompt {
 
 export interface TasksMessage { type: 'tasks'; running: string[]; open: OpenPrompt[] }
 
-/** By this page's clock [ms]. */
-export interface PageTimes {
-  response_ms?: number;
-  delay_ms?: number;
-  picture_ms?: number;
-  paused_ms?: number;
-  steady_s?: number; // the first picture, by the server's steady clock [s]
-  clock_error_ms?: number;
-}
-
-export interface TaskReportMessage extends PageTimes {
-  type: 'task';
-  seat: string;
-  task: string;
-  number: number;
-  what: 'shown' | 'answer';
-}
+/** By this page's clock [ms]; `steady_s` of the first picture by the server's steady clock [s]. */
+export type PageTimes = {
+  [Time in Exclude<keyof TaskDone, 'type' | 'seat' | 'task' | 'number' | 'what'>]?: number };

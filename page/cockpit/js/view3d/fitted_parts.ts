@@ -182,7 +182,7 @@ export class FittedParts {
 }
 
 /** @returns lamps that shine, independent of the light */
-function lampPart(three: Three): Part {
+export function lampPart(three: Three): Part {
   return { geometry: new three.BoxGeometry(1, 1, 1), tinted: true,
     material: new three.MeshBasicMaterial({ toneMapped: false }) };
 }

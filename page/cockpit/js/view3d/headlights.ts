@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Headlights and tail lamps at dusk and in fog: lamps, their glow, and the light on the road. */
 
+import { lampPart } from './fitted_parts.js';
 import { contrastLeft } from './road/fog.js';
 import { mergeable, SeenInstances } from './seen_instances.js';
 
@@ -156,12 +157,6 @@ export class Headlights {
     return turned === 0 ? this.#matrix
       : this.#matrix.multiply(this.#step.makeRotationZ(turned));
   }
-}
-
-/** @returns lamps that shine */
-function lampPart(three: Three): Part {
-  return { geometry: new three.BoxGeometry(1, 1, 1), tinted: true,
-    material: new three.MeshBasicMaterial({ toneMapped: false }) };
 }
 
 /** @returns glow around a lamp, seen from ahead; fog dims its colour */

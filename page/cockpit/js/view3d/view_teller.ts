@@ -54,7 +54,7 @@ export class ViewTeller {
     this.#told_ms = now_ms;
     const { epoch, serverClock } = this.#store;
     const place = this.#place.of(this.#stage);
-    const shown = [...this.#overlays(), ...contents.shown].slice(0, MOST);
+    const shown = nearest([...this.#overlays(), ...contents.shown]);
     painted().then((drawn_ms) => {
       const time = serverClock.at(drawn_ms);
       if (time !== null) {
@@ -85,4 +85,11 @@ export class ViewTeller {
     ...INSTRUMENTS.flatMap(([id, selector]) => entry(
       'instrument', id, document.querySelector(selector)))];
   }
+}
+
+/** Return the nearest things in their order; what lies over the view is nearer than all else. */
+function nearest(things: ShownThing[]): ShownThing[] {
+  const kept = new Set([...things].sort((one, other) => (one[6] ?? 0) - (other[6] ?? 0))
+    .slice(0, MOST));
+  return things.filter((thing) => kept.has(thing));
 }

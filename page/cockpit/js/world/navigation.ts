@@ -75,13 +75,6 @@ export class Navigation {
     this.#zoomed = true;
   }
 
-  /** Show a pose at close range, without following. */
-  lookAt({ x, y }: { x: number; y: number }) {
-    this.followed = null;
-    this.#camera.lookAt(x, y);
-    this.#changed();
-  }
-
   /** Show the whole map, north up. */
   fit(animated = true) {
     if (this.#bounds !== null) {

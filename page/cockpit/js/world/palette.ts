@@ -31,17 +31,12 @@ export function themeColor(name: string): string {
  * Call a function at each change of the system's theme or of data-theme on <html>.
  *
  * @param changed called after the new colours are in force
- * @returns ends it
  */
-export function onThemeChange(changed: () => void): () => void {
+export function onThemeChange(changed: () => void) {
   const observer = new MutationObserver(changed);
   observer.observe(document.documentElement, { attributeFilter: ['data-theme', 'class'] });
   const query = window.matchMedia('(prefers-color-scheme: dark)');
   query.addEventListener('change', changed);
-  return () => {
-    observer.disconnect();
-    query.removeEventListener('change', changed);
-  };
 }
 
 /** `map-label-ground` -> `labelGround` */

@@ -57,8 +57,6 @@ export class World {
   // While something else is shown in its place, nothing is drawn.
   #away = false;
   #view: View;
-  #ends: (() => void)[] = [];
-  #frame = 0;
 
   /**
    * @param canvas its parent gets the toolbar
@@ -78,7 +76,7 @@ export class World {
     this.#attachHands(options);
     this.#attachSizes(options.covered ?? null);
     this.#attachStore();
-    this.#frame = requestAnimationFrame((now_ms) => this.#animate(now_ms));
+    requestAnimationFrame((now_ms) => this.#animate(now_ms));
   }
 
   /** Return the id of the followed vehicle or object, null while the camera is free. */
@@ -119,14 +117,6 @@ export class World {
    */
   vehicle(index: number): DrawnVehicle | undefined {
     return this.#painter.vehicles.vehicles[index];
-  }
-
-  /** Show a vehicle or object in the middle, without following it. */
-  centerOn(id: string | null) {
-    const pose = this.#poseOf(id);
-    if (pose !== null) {
-      this.#navigation.lookAt(pose);
-    }
   }
 
   /** Show the whole map, north up. */
@@ -176,12 +166,6 @@ export class World {
     this.#dirty = true;
   }
 
-  /** Stop the world: no more frames, keys or events. */
-  close() {
-    cancelAnimationFrame(this.#frame);
-    this.#ends.forEach((end) => end());
-  }
-
   #attachHands({ keys = true, toolbar = true }: Options) {
     const navigation = this.#navigation;
     const { plans, predictions, labels } = this.#painter;
@@ -210,7 +194,7 @@ export class World {
       },
     });
     if (keys) {
-      this.#ends.push(attachKeys(actions));
+      attachKeys(actions);
     }
     if (toolbar && this.#canvas.parentElement !== null) {
       this.#toolbar = createToolbar(this.#canvas.parentElement, actions);
@@ -219,17 +203,16 @@ export class World {
   }
 
   #attachSizes(covered: HTMLElement | null) {
-    this.#ends.push(onThemeChange(() => {
+    onThemeChange(() => {
       this.#palette.read();
       this.redraw();
-    }));
+    });
     const observer = new ResizeObserver(() => this.#resize(covered));
     for (const element of [this.#canvas, covered]) {
       if (element !== null) {
         observer.observe(element);
       }
     }
-    this.#ends.push(() => observer.disconnect());
   }
 
   #attachStore() {
@@ -237,12 +220,13 @@ export class World {
     if (store.scene !== null) {
       this.#load(store.scene);
     }
-    this.#ends.push(
-      store.on('scene', (scene) => this.#load(scene)),
-      store.on('objects', (step) => this.#painter.vehicles.brakeLights.update(step)),
-      store.on('hello', () => this.#sendLayers()),
-      store.on('events', () => this.#painter.plans.applyEvents(store.scene, store.fired)),
-      ...REDRAWN_ON.map((name) => store.on(name, () => this.redraw())));
+    store.on('scene', (scene) => this.#load(scene));
+    store.on('objects', (step) => this.#painter.vehicles.brakeLights.update(step));
+    store.on('hello', () => this.#sendLayers());
+    store.on('events', () => this.#painter.plans.applyEvents(store.scene, store.fired));
+    for (const name of REDRAWN_ON) {
+      store.on(name, () => this.redraw());
+    }
   }
 
   #resize(covered: HTMLElement | null) {
@@ -299,7 +283,7 @@ export class World {
   }
 
   #animate(now_ms: number) {
-    this.#frame = requestAnimationFrame((next_ms) => this.#animate(next_ms));
+    requestAnimationFrame((next_ms) => this.#animate(next_ms));
     this.#draw(now_ms);
   }
 

@@ -20,11 +20,11 @@ export interface Body {
 
 export interface Axles { front: number; rear: number } // ahead of the middle [m]
 
-const PAINT: Tint = [1, 1, 1, true];
-const GLASS: Tint = [0.07, 0.09, 0.12];
-const TRIM: Tint = [0.05, 0.05, 0.06];
-const HEADLIGHT: Tint = [1.5, 1.5, 1.4];
-const LENS: Tint = [0.35, 0.03, 0.03];
+export const PAINT: Tint = [1, 1, 1, true];
+export const GLASS: Tint = [0.07, 0.09, 0.12];
+export const TRIM: Tint = [0.05, 0.05, 0.06];
+export const HEADLIGHT: Tint = [1.5, 1.5, 1.4];
+export const LENS: Tint = [0.35, 0.03, 0.03];
 const PLATE: Tint = [1.3, 1.3, 1.25];
 
 /** A section across a car: half widths and heights. */

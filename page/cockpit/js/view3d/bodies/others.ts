@@ -3,11 +3,11 @@
 /** Bodies of two-wheelers, people and things: x ahead, y left, z up, around their middle. */
 
 import { MeshBuilder } from './mesh_builder.js';
+import { PAINT } from './motor_vehicles.js';
 
 import type { Body } from './motor_vehicles.js';
 import type { Point, Tint } from './mesh_builder.js';
 
-const PAINT: Tint = [1, 1, 1, true];
 const DARK: Tint = [0.06, 0.06, 0.07];
 const METAL: Tint = [0.45, 0.46, 0.48];
 const SKIN: Tint = [0.75, 0.55, 0.42];

@@ -3,15 +3,11 @@
 /** Motor vehicles with few triangles, for use where they are small in the picture. */
 
 import { MeshBuilder } from './mesh_builder.js';
+import { GLASS, HEADLIGHT, LENS, PAINT, TRIM } from './motor_vehicles.js';
 
 import type { Point, Tint } from './mesh_builder.js';
 import type { Body } from './motor_vehicles.js';
 
-const PAINT: Tint = [1, 1, 1, true];
-const GLASS: Tint = [0.07, 0.09, 0.12];
-const TRIM: Tint = [0.05, 0.05, 0.06];
-const HEADLIGHT: Tint = [1.5, 1.5, 1.4];
-const LENS: Tint = [0.35, 0.03, 0.03];
 const LOAD: Tint = [0.9, 0.9, 0.88];
 const WHEEL_CORNERS = 6;
 
