@@ -111,7 +111,7 @@ class SessionJournal:
         self.path = folder / JOURNAL
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._file: IO[bytes] = self.path.open('a+b')
+            self._file: IO[bytes] = self.path.open('a+b', buffering=0)
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             sync_folder(folder)
             sync_folder(folder.parent)
@@ -138,11 +138,16 @@ class SessionJournal:
         :raises InputError: if it cannot be written.
         """
         line = json.dumps(entry, ensure_ascii=False, allow_nan=False) + '\n'
+        size = os.fstat(self._file.fileno()).st_size
         try:
-            self._file.write(line.encode('utf-8', 'surrogatepass'))
-            self._file.flush()
+            left = line.encode('utf-8', 'surrogatepass')
+            while left:
+                left = left[self._file.write(left):]
             os.fsync(self._file.fileno())
         except OSError as error:
+            # Nothing of a refused entry stays.
+            with suppress(OSError):
+                self._file.truncate(size)
             raise _refusal(self.path, error) from error
         self.entries.append(json.loads(line))
 
