@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The journal of a participant's session, line by line, safe against crashes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from enum import StrEnum
 import fcntl
@@ -187,6 +187,27 @@ def read_journal(folder: Path) -> list[JournalEntry]:
             if line.endswith(b'\n'):
                 entries.append(read_entry(line))
     return entries
+
+
+def done_items(entries: Iterable[JournalEntry]) -> dict[str, JournalEntry]:
+    """
+    Return the entries by which items are finished or skipped, by their ids.
+
+    An item that is to be repeated is not among them.
+    """
+    found: dict[str, JournalEntry] = {}
+    for entry in entries:
+        if entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
+            found[entry['item']] = entry
+        elif entry['entry'] == SessionEvent.REPEATED:
+            found.pop(entry['item'], None)
+    return found
+
+
+def how_ended(entries: Iterable[JournalEntry]) -> JournalEntry | None:
+    """Return the entry by which a session ended before its last item; None without one."""
+    return next((entry for entry in entries
+                 if entry['entry'] in (SessionEvent.ENDED, SessionEvent.EXCLUDED)), None)
 
 
 def _refusal(path: Path, error: OSError) -> InputError:
