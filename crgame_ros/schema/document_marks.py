@@ -4,7 +4,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-import math
+import sys
 from typing import Any, get_args
 
 from crgame_ros.schema.marks import Handler
@@ -84,7 +84,7 @@ class Row:
 
         def made(given: object, _: object) -> object:
             if not isinstance(given, list) or len(given) != len(names) or not all(
-                    isinstance(number, int | float) and math.isfinite(number)
+                    isinstance(number, int | float) and abs(number) <= sys.float_info.max
                     for number in given):
                 raise ValueError(f'should be a list of {len(names)} finite numbers')
             return source(*map(float, given))

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from crgame_ros.errors import InputError
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Within, Wording
-from crgame_ros.study.local_text import ColumnName
+from crgame_ros.study.local_text import BESIDE, ColumnName
 
 _SEE = 'see docs/studies.md for the keys'
 
@@ -158,7 +158,7 @@ class Exclusion:
     when: AnswerCondition | None = None
     attention_failed: Annotated[int, Within(1, 1000)] | None = None
     reason: Annotated[str, Wording(r'[^\x00-\x1f]{0,200}', 'give 200 characters at most')] = ''
-    page: Annotated[str, Wording(r'[^/\0][^\0]*\.md',
+    page: Annotated[str, Wording(rf'{BESIDE}\.md',
                                  'name a Markdown file beside this one')] | None = None
 
     def check(self) -> None:

@@ -56,7 +56,7 @@ class StudyFinding:
     """
     A finding about a study.
 
-    :param kind: an `error` prevents the study from running.
+    :param kind: an `error` is met by participants, or stops the study before them.
     :param text: one line for the user.
     """
 
@@ -103,12 +103,17 @@ def check_study(study: StudyFile,
 
 def length_of(study: StudyFile) -> SessionLength:
     """
-    Estimate the length of a session.
+    Estimate the length of a session; of the longest, if groups differ.
 
     :raises InputError: if the study cannot be planned, or a drive has no end.
     """
+    return max((_length(study, group) for group in study.group_names),
+               key=lambda each: each.driving_s + each.else_s)
+
+
+def _length(study: StudyFile, group: str) -> SessionLength:
     driving_s = else_s = 0.0
-    for item in session_of(study, 0):
+    for item in session_of(study, 0, group):
         what = item.what
         if isinstance(what, PlannedTrial):
             driving_s += _duration_s(what.condition.settings)

@@ -15,7 +15,7 @@ from crgame_ros.schema.reading import read
 from crgame_ros.study.answer_condition import Exclusion
 from crgame_ros.study.elsewhere import Elsewhere
 from crgame_ros.study.groups import Groups
-from crgame_ros.study.local_text import LocalText, Name, Text
+from crgame_ros.study.local_text import BESIDE, LocalText, Name, Text
 from crgame_ros.study.planned_analysis import PlannedAnalysis
 from crgame_ros.study.quality import QualityBounds
 from crgame_ros.study.question import check_conditions, Question
@@ -78,7 +78,7 @@ class Page:
 
     FORM: ClassVar[Form] = Form(_SEE, short='file')
 
-    file: Annotated[str, Wording(r'[^/\0][^\0]*\.md', 'name a Markdown file beside this one')]
+    file: Annotated[str, Wording(rf'{BESIDE}\.md', 'name a Markdown file beside this one')]
     consent: bool = False
     version: Annotated[str, Wording(r'[^\x00-\x1f]{0,60}', 'give 60 characters at most')] = ''
 
@@ -93,7 +93,7 @@ class Questions:
 
     FORM: ClassVar[Form] = Form(_SEE, short='name')
 
-    name: Annotated[str, Wording(r'[^/\0][^\0]*', 'name a questionnaire or a YAML file')]
+    name: Annotated[str, Wording(BESIDE, 'name a questionnaire, or a YAML file beside this one')]
 
 
 @dataclass(frozen=True)
@@ -181,8 +181,8 @@ class Block:
     :param factors: names of the factors whose levels are crossed; all by default.
     :param repetitions: number of drives of each condition.
     :param order: of the conditions, drawn for each repetition.
-    :param sequences: lists of conditions, `level` or `level/level`, assigned to participants in
-        turn instead.
+    :param sequences: equally long lists of conditions, `level` or `level/level`, assigned to
+        participants in turn instead.
     :param staircase: by which answers decide on the level of the next trial, instead of an order.
     :param stop: by which it ends before its last trial.
     :param settings: of its trials, besides those of the study.
@@ -212,7 +212,7 @@ class Block:
     after: Steps = ()
 
     def check(self) -> None:
-        """Refuse an order beside a staircase."""
+        """Refuse an order beside a staircase, and sessions with different numbers of trials."""
         if self.staircase is not None and (
                 self.repetitions > 1 or self.order != 'williams' or self.sequences):
             raise InputError('has a staircase, and repetitions or an order of its conditions', '',
@@ -220,6 +220,10 @@ class Block:
         if self.staircase is not None and self.stop is not None:
             raise InputError('has a staircase, which ends by its own rule', 'stop',
                              'leave it out, or give it to the staircase')
+        lengths = {len(sequence) for sequence in self.sequences}
+        if lengths and (0 in lengths or len(lengths) > 1):
+            raise InputError('are not equally long, or empty', 'sequences',
+                             'give each participant as many trials')
 
     @property
     def rule(self) -> Staircase | StopRule | None:
@@ -290,6 +294,9 @@ class StudyFile:
         """Refuse what names factors, fields, questions or groups that are not there."""
         known = {factor.name for factor in self.factors}
         for block in self.blocks:
+            if block.name in ('before', 'after'):
+                raise InputError('has the name of the steps around all blocks',
+                                 f'blocks: {block.name}', 'give it another name')
             for name in block.factors or ():
                 if name not in known:
                     raise InputError(f'names the factor "{name}", which is not there',

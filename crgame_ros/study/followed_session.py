@@ -15,7 +15,7 @@ from crgame_ros.study.questionnaire import (
     questionnaire_of,
     questions_of,
 )
-from crgame_ros.study.session_journal import JournalEntry, SessionEvent
+from crgame_ros.study.session_journal import done_items, JournalEntry, SessionEvent
 from crgame_ros.study.session_script import Fields, SessionItem
 from crgame_ros.study.staircase import ToldTrial, Track
 from crgame_ros.study.trial_plan import BlockStaircases, PlannedTrial
@@ -95,7 +95,11 @@ def followed(study: StudyFile, place: int, group: str, planned: Sequence[Session
         if block.stop is not None:
             judged = _judged(study, block, entries)
             end = block.stop.ends_after(judged.get(trial.place) for trial in of_block)
-            needed[block.name] = {trial.place: trial for trial in of_block[:end]}
+            # What is done stays, even if a repeat lets the block end before it.
+            done = {_place_in(block, entry) for entry in entries
+                    if entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED)}
+            needed[block.name] = {trial.place: trial for trial in of_block
+                                  if end is None or trial.place <= end or trial.place in done}
         if block.staircase is None:
             continue
         staircases = BlockStaircases(study, block, group)
@@ -123,6 +127,12 @@ def _items(planned: Iterable[SessionItem],
                 yield item
 
 
+def _place_in(block: Block, entry: JournalEntry) -> int | None:
+    """Return the place in a block of the trial that an entry is about; None if it is no trial."""
+    of_block, _, number = (entry.get('item') or '').partition('/')
+    return int(number) if of_block == block.name and number.isdecimal() else None
+
+
 def _judged(study: StudyFile, block: Block, entries: Entries) -> dict[int, bool | None]:
     """
     Return whether trials of a block that are done were a success, by their places.
@@ -131,24 +141,18 @@ def _judged(study: StudyFile, block: Block, entries: Entries) -> dict[int, bool 
     """
     success, judging = block.judged, judging_question(study, block)
     assert success is not None
-    done: dict[str, JournalEntry] = {}
-    for entry in entries:
-        item = entry.get('item') or ''
-        if entry['entry'] == SessionEvent.REPEATED:
-            done.pop(item, None)
-        elif entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
-            done[item] = entry
+    done = done_items(entries)
     found = {}
     for name, entry in done.items():
-        of_block, _, number = name.partition('/')
-        if of_block != block.name or not number.isdecimal():
+        place = _place_in(block, entry)
+        if place is None:
             continue
         value = None
         if entry['entry'] == SessionEvent.FINISHED:
             value = entry.get(success.drive or '') if judging is None else (
                 done.get(f'{name}/after/{judging[0]}', {}).get('answers') or {}).get(
                     success.question or '')
-        found[int(number)] = None if value in (None, []) else success.holds(value)
+        found[place] = None if value in (None, []) else success.holds(value)
     return found
 
 
@@ -158,10 +162,10 @@ def _told(study: StudyFile, block: Block, staircases: BlockStaircases,
     started: dict[str, str | None] = {}
     driven: dict[int, tuple[int, int]] = {}
     for entry in entries:
-        item = entry.get('item') or ''
-        of_block, _, number = item.partition('/')
-        if of_block != block.name or not number.isdecimal():
+        place = _place_in(block, entry)
+        if place is None:
             continue
+        item = entry['item']
         if entry['entry'] == SessionEvent.STARTED:
             started[item] = entry.get('condition')
         elif entry['entry'] == SessionEvent.FINISHED and (name := started.get(item)) is not None:
@@ -171,7 +175,7 @@ def _told(study: StudyFile, block: Block, staircases: BlockStaircases,
                 raise InputError(f'tells of the condition "{name[:60]}", which is '
                                  'not in the block', item, 'put back the study file that '
                                  'the session was run with')
-            driven[int(number)] = at
+            driven[place] = at
     judged = _judged(study, block, entries)
     return {place: ToldTrial(driven.get(place), judged.get(place), place in judged)
             for place in sorted(driven.keys() | judged.keys()) if place <= staircases.most}

@@ -312,7 +312,7 @@ def enrolled(participants: Path) -> list[Enrolment]:
 
     :param participants: folder with a folder of each.
     """
-    paths = sorted(participants.iterdir()) if participants.is_dir() else ()
+    paths = sorted(filter(Path.is_dir, participants.iterdir())) if participants.is_dir() else ()
     return sorted((found for path in paths if (found := read_enrolment(path)) is not None),
                   key=lambda each: (each.place, each.participant))
 

@@ -16,6 +16,8 @@ ColumnName = Annotated[str, Wording('[a-z][a-z0-9_]{0,39}',
                                     'begin with a letter a-z, then letters, digits and _')]
 Name = Annotated[str, Wording('[A-Za-z0-9][A-Za-z0-9_-]{0,39}',
                               'give 1 to 40 letters, digits, - and _')]
+# Pattern of the name of a file beside the study file, or below it.
+BESIDE = r'(?!([^\0]*/)?\.\.(/|$))[^/\0][^\0]*'
 
 
 @dataclass(frozen=True)

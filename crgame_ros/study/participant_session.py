@@ -29,7 +29,13 @@ from crgame_ros.study.groups import (
 )
 from crgame_ros.study.question import Answer, asked_of, check_answers, Question
 from crgame_ros.study.questionnaire import questionnaire_of, questions_of
-from crgame_ros.study.session_journal import JournalEntry, SessionEvent, SessionJournal
+from crgame_ros.study.session_journal import (
+    done_items,
+    how_ended,
+    JournalEntry,
+    SessionEvent,
+    SessionJournal,
+)
 from crgame_ros.study.session_script import (
     Fields,
     is_driven,
@@ -228,7 +234,7 @@ class ParticipantSession:
             if each._has_ended:
                 each._leave_partners('')
         for item in filter(is_driven, self.items):
-            if len({(item.id in each.done, each._practice_drives(item.id))
+            if len({(item.id in each.done, each.practice_drives(item.id))
                     for each in all_of_them}) > 1:
                 for each in all_of_them:
                     each._repeat(item.id, 'the journals of those who drove together differ')
@@ -244,13 +250,7 @@ class ParticipantSession:
     @property
     def done(self) -> frozenset[str]:
         """Return the ids of finished or skipped items."""
-        found: set[str] = set()
-        for entry in self.journal.entries:
-            if entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
-                found.add(entry['item'])
-            elif entry['entry'] == SessionEvent.REPEATED:
-                found.discard(entry['item'])
-        return frozenset(found)
+        return frozenset(done_items(self.journal.entries))
 
     @property
     def next_item(self) -> SessionItem | None:
@@ -264,8 +264,7 @@ class ParticipantSession:
 
     @property
     def _has_ended(self) -> bool:
-        return any(entry['entry'] in (SessionEvent.ENDED, SessionEvent.EXCLUDED)
-                   for entry in self.journal.entries)
+        return how_ended(self.journal.entries) is not None
 
     @property
     def planned_items(self) -> tuple[SessionItem, ...]:
@@ -317,6 +316,11 @@ class ParticipantSession:
         return sum(entry['entry'] == SessionEvent.STARTED and entry['item'] == item
                    for entry in self.journal.entries)
 
+    def repeats(self, item: str) -> int:
+        """Return how often an item was repeated after it was done."""
+        return sum(entry['entry'] == SessionEvent.REPEATED and entry['item'] == item
+                   for entry in self.journal.entries)
+
     def start(self, run: str = '') -> int:
         """
         Record the start of the next item.
@@ -340,9 +344,8 @@ class ParticipantSession:
         scale = questionnaire_of(self.study, item)
         if scale is None:
             return questions_of(self.study, item)
-        repeats = sum(entry['entry'] == SessionEvent.REPEATED and entry['item'] == item.id
-                      for entry in self.journal.entries)
-        return scale.ordered(f'{self.study.seed} {self.participant} {item.id} {repeats}')
+        return scale.ordered(f'{self.study.seed} {self.participant} {item.id} '
+                             f'{self.repeats(item.id)}')
 
     def finish(self, answers: Mapping[str, object] | None = None, **told: object) -> SessionItem:
         """
@@ -391,7 +394,7 @@ class ParticipantSession:
         if not isinstance(item.what, PracticeDrives):
             raise InputError('is no practice', item.id, 'finish it')
         self._add(SessionEvent.PRACTISED, item=item.id, good=good, **told)
-        drives = self._practice_drives(item.id)
+        drives = self.practice_drives(item.id)
         practice = item.what.practice
         over = drives >= practice.at_least and (good or 0 < practice.at_most <= drives)
         if over:
@@ -399,7 +402,7 @@ class ParticipantSession:
                       criterion_met=good)
         return over
 
-    def _practice_drives(self, item: str) -> int:
+    def practice_drives(self, item: str) -> int:
         """Return the number of drives of a practice since its start or last repeat."""
         drives = 0
         for entry in self.journal.entries:

@@ -5,6 +5,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 import math
+import sys
 from typing import Annotated, Any, ClassVar, TypeGuard
 
 from crgame_ros.errors import InputError, short
@@ -340,4 +341,6 @@ def check_conditions(questions: Sequence[Question], *, are_fields: bool) -> None
 
 
 def _finite(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    # A long integer has no float.
+    return isinstance(value, int | float) and not isinstance(value, bool) \
+        and abs(value) <= sys.float_info.max

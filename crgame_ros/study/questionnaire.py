@@ -121,10 +121,13 @@ class Questionnaire:
     scores: Annotated[tuple[Score, ...], Listed(0, 50, 'score', 'name')] = ()
 
     def check(self) -> None:
-        """Refuse scores of unknown questions, and conditions on questions that are not before."""
+        """Refuse scores that do not fit the questions, and conditions on those that come later."""
         check_conditions(self.questions, are_fields=False)
         known = {question.name: question for question in self.questions}
         for score in self.scores:
+            if score.name in known:
+                raise InputError('has the name of a question', f'scores: {score.name}',
+                                 'give it another name: both are columns')
             for item in (*score.items, *score.flipped, *score.pairs):
                 if item not in known:
                     raise InputError(f'names the question "{item}", which is not there',

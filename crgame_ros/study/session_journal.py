@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The journal of a participant's session, line by line, safe against crashes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from enum import StrEnum
 import fcntl
@@ -111,7 +111,7 @@ class SessionJournal:
         self.path = folder / JOURNAL
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._file: IO[bytes] = self.path.open('a+b')
+            self._file: IO[bytes] = self.path.open('a+b', buffering=0)
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             sync_folder(folder)
             sync_folder(folder.parent)
@@ -138,11 +138,16 @@ class SessionJournal:
         :raises InputError: if it cannot be written.
         """
         line = json.dumps(entry, ensure_ascii=False, allow_nan=False) + '\n'
+        size = os.fstat(self._file.fileno()).st_size
         try:
-            self._file.write(line.encode('utf-8', 'surrogatepass'))
-            self._file.flush()
+            left = line.encode('utf-8', 'surrogatepass')
+            while left:
+                left = left[self._file.write(left):]
             os.fsync(self._file.fileno())
         except OSError as error:
+            # Nothing of a refused entry stays.
+            with suppress(OSError):
+                self._file.truncate(size)
             raise _refusal(self.path, error) from error
         self.entries.append(json.loads(line))
 
@@ -182,6 +187,27 @@ def read_journal(folder: Path) -> list[JournalEntry]:
             if line.endswith(b'\n'):
                 entries.append(read_entry(line))
     return entries
+
+
+def done_items(entries: Iterable[JournalEntry]) -> dict[str, JournalEntry]:
+    """
+    Return the entries by which items are finished or skipped, by their ids.
+
+    An item that is to be repeated is not among them.
+    """
+    found: dict[str, JournalEntry] = {}
+    for entry in entries:
+        if entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
+            found[entry['item']] = entry
+        elif entry['entry'] == SessionEvent.REPEATED:
+            found.pop(entry['item'], None)
+    return found
+
+
+def how_ended(entries: Iterable[JournalEntry]) -> JournalEntry | None:
+    """Return the entry by which a session ended before its last item; None without one."""
+    return next((entry for entry in entries
+                 if entry['entry'] in (SessionEvent.ENDED, SessionEvent.EXCLUDED)), None)
 
 
 def _refusal(path: Path, error: OSError) -> InputError:

@@ -18,7 +18,8 @@ from crgame_ros.study.trial_settings import Factor
 
 _SEE = 'see docs/studies.md for the keys'
 EndReason = Literal['reversals', 'at_most']
-OUTCOMES = ('time', 'collision', 'off_road')
+# How a drive ends: by its duration, by the own vehicle's violation, or by that of another one.
+OUTCOMES = ('time', 'collision', 'off_road', 'other')
 
 
 @dataclass(frozen=True)

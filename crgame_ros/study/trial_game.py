@@ -38,6 +38,9 @@ def seats_of(settings: TrialSettings, game: Game) -> tuple[str, ...]:
         if seat not in ids:
             raise InputError(f'has no human or AV "{seat}"', settings.game or 'trial',
                              f'name {" or ".join(ids)} as a seat')
+    if settings.confederate in seats:
+        raise InputError(f'gives {settings.confederate} to a participant and the experimenter',
+                         settings.game or 'trial', 'name another human as "confederate"')
     if settings.confederate is not None and settings.confederate not in humans:
         raise InputError(f'has no human "{settings.confederate}"', settings.game or 'trial',
                          f'name {" or ".join(humans) or "none"} as "confederate"')

@@ -165,8 +165,10 @@ def plan_trials(study: StudyFile, place: int, group: str = '') -> tuple[PlannedT
         conditions = conditions_of(study, block, group)
         sequences = _sequences(block, [condition.name for condition in conditions])
         in_block = 0
+        # Blocks with equally many conditions have orders of their own.
+        seed = ' '.join((str(study.seed), *((block.name,) if block != study.blocks[0] else ())))
         for repetition in range(block.repetitions):
-            for index in order_of(block.order, len(conditions), study.seed, in_turn, repetition,
+            for index in order_of(block.order, len(conditions), seed, in_turn, repetition,
                                   sequences, group):
                 in_block += 1
                 number = len(trials) + 1

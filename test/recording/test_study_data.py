@@ -283,11 +283,20 @@ def test_the_dictionary_names_every_column(studied: Studied) -> None:
 
 
 def test_twice_gives_the_same_and_measures_nothing_again(copied: Path) -> None:
+    """What does not count any more is not in BIDS either; what somebody put there stays."""
+    bids = copied / 'data' / 'bids'
+    for own in (bids / 'CHANGES', bids / 'sub-P01' / 'eeg' / 'sub-P01_task-demo_eeg.edf'):
+        own.parent.mkdir(exist_ok=True)
+        own.touch()
     before = digests(copied)
+    for name in ('P01', 'P09'):
+        old = bids / f'sub-{name}/beh/sub-{name}_task-demo_run-9_recording-x_physio.json'
+        old.parent.mkdir(parents=True, exist_ok=True)
+        old.touch()
     kept = {path: path.stat().st_mtime_ns for path in (copied / 'data' / '.runs').rglob('*')}
     assert len({path.parent for path in kept if path.is_file()}) == len(ROWS)
     assert main(['study', 'data', str(copied), '--bids']) == 0
-    assert digests(copied) == before
+    assert digests(copied) == before and not (bids / 'sub-P09').exists()
     assert {path: path.stat().st_mtime_ns
             for path in (copied / 'data' / '.runs').rglob('*')} == kept
 

@@ -4,10 +4,11 @@
 
 from dataclasses import dataclass
 import json
+import math
 from typing import Annotated, Literal
 
 from crgame_ros.errors import InputError
-from crgame_ros.schema.document_marks import Bounded
+from crgame_ros.schema.document_marks import Bounded, Row
 from crgame_ros.schema.json_documents import JsonDocument
 from crgame_ros.schema.messages import Message, MessageReader
 from pydantic import TypeAdapter, ValidationError
@@ -20,6 +21,14 @@ class Entry:
 
     n: int
     names: Annotated[tuple[str, ...], Bounded(3)] = ()
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point."""
+
+    x: float
+    y: float
 
 
 @pytest.mark.parametrize('kind', [list[Entry], tuple[Entry, ...]])
@@ -47,6 +56,14 @@ def test_what_is_longer_is_refused_before_it_is_read(given: object, said: str) -
     with pytest.raises(InputError) as caught:
         reader.read(json.dumps(given))
     assert str(caught.value).startswith(f'/topic: is no list ({said}')
+
+
+@pytest.mark.parametrize('number', ['1', None, math.nan, math.inf, -10 ** 400])
+def test_a_row_has_finite_numbers_alone(number: object) -> None:
+    reader = TypeAdapter(Annotated[Point, Row()])
+    assert reader.validate_python([1, 2.5]) == Point(1.0, 2.5)
+    with pytest.raises(ValidationError, match='a list of 2 finite numbers'):
+        reader.validate_python([number, 0.0])
 
 
 def test_a_message_names_the_key_but_not_the_value() -> None:

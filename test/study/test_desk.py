@@ -11,7 +11,7 @@ import sys
 from aiohttp import ClientSession, CookieJar, WSMsgType, WSServerHandshakeError
 from crgame_ros.study.desk.pages import words_of
 from crgame_ros.study.desk.participant_document import experimenter_document
-from crgame_ros.study.desk.server import MAX_MALFORMED
+from crgame_ros.study.desk.server import MAX_MALFORMED, MAX_PAGES
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -313,3 +313,15 @@ async def test_a_hostile_page_is_dropped_and_the_others_go_on(tmp_path: Path) ->
                               'answers': {'age': 33, 'licence': 'yes'}, **TIMES})
         await shown(good, shows('page'))
         await good.close()
+
+
+@in_loop
+async def test_many_pages_of_a_participant_do_not_shut_the_experimenter_out(tmp_path: Path
+                                                                            ) -> None:
+    async with served(tmp_path, languages=[]) as running:
+        pages = [await running.join() for _ in range(MAX_PAGES)]
+        with pytest.raises(WSServerHandshakeError):
+            await running.join()
+        director = await running.direct()
+        for page in (*pages, director):
+            await page.close()

@@ -8,8 +8,11 @@ from itertools import count
 from pathlib import Path
 import sys
 
+from crgame_ros.cli import main
+from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.errors import InputError
-from crgame_ros.study.conduct.study_drive import Rider
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.study.conduct.study_drive import outcome_of, Rider
 from crgame_ros.study.data.conducted_study import read_participant
 from crgame_ros.study.data.withdrawal import Withdrawal
 from crgame_ros.study.desk.desk import Desk
@@ -211,3 +214,25 @@ def test_recordings_are_those_of_the_first_and_go_with_any_of_them(tmp_path: Pat
         root / 'participants' / 'P01' / 'runs' / '1'}
     held = [each.path.relative_to(root).as_posix() for each in Withdrawal(root, 'P02').held()]
     assert held == ['participants/P01/runs/1', 'participants/P02']
+
+
+def test_who_did_nothing_has_not_left_the_road(tmp_path: Path) -> None:
+    """The violation of one ends the drive of all."""
+    status = RunStatus()
+    status.begin(('hv0', 'hv1', 'hv2'))
+    status.reason = 'drivability of hv1'
+    status.contacts.append({'vehicle': 'hv1', 'with': 'hv0', 't': 2.0})
+    assert [outcome_of(status, seat, 3.0)['outcome'] for seat in ('hv0', 'hv1', 'hv2')] == [
+        'collision', 'collision', 'other']
+    status.contacts.clear()
+    assert [outcome_of(status, seat, 3.0)['outcome'] for seat in ('hv0', 'hv1')] == [
+        'other', 'off_road']
+
+
+def test_a_preregistration_has_one_order_for_each_pair(tmp_path: Path) -> None:
+    study_of(tmp_path, participants=6, blocks=[{'name': 'main'}], settings={
+        'game': str(scenarios_directory() / 'cut_in.yaml'), 'seats': ['hv0', 'av0']})
+    assert main(['study', 'preregister', str(tmp_path / 'study.yaml')]) == 0
+    orders = (tmp_path / 'preregistration.md').read_text().partition('## Orders')[2]
+    assert [line[:4] for line in orders.partition('## ')[0].splitlines()
+            if line[2:3].isdecimal()] == ['| 1 ', '| 2 ', '| 3 ']

@@ -365,3 +365,10 @@ def test_options_that_cannot_be_used_begin_nothing(
     told = capsys.readouterr().err
     assert message in told and 'Traceback' not in told
     assert not out.exists()
+
+
+def test_those_who_drive_together_do_not_come_from_a_platform(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_study(tmp_path, elsewhere=PLATFORM, settings={'seats': ['hv0', 'av0']})
+    assert main(['study', 'serve', str(tmp_path / 'study.yaml'), '--listen', '127.0.0.1']) == 2
+    assert 'is for participants who drive together' in capsys.readouterr().err

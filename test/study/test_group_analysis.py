@@ -135,6 +135,9 @@ def test_the_model_and_the_script_have_the_groups() -> None:
              for name in ('g0', 'g1')}
     assert effects['display: g1'].value == pytest.approx(means['g1'] - means['g0'])
     script = r_script(study, columns)
+    # R would read the levels 01 and T as a number and a truth value.
+    for name in ('participant', 'block', 'load', 'display_level'):
+        assert f'{name}" = "character"' in script
     assert 'compare("speed", "load", "none", "high", "two.sided")' in script
     assert 'compare_groups("speed", "display_level", "g0", "g1", "two.sided")' in script
     assert '`speed` ~ `load` + `display_level` + (1 | participant)' in script

@@ -259,6 +259,8 @@ def test_a_study_without_groups_replaces_as_well(tmp_path: Path) -> None:
     plain = read(StudyFile, {key: value for key, value in STUDY.items() if key != 'groups'} | {
         'blocks': [{'name': 'main'}]}, 'study')
     places = []
+    # A file of another program is no participant.
+    (tmp_path / '.DS_Store').touch()
     for name in ('P1', 'P2', 'P3', 'P4'):
         with opened(tmp_path, name, plain) as session:
             places.append(session.place)

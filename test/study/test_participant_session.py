@@ -6,12 +6,15 @@ from collections.abc import Iterator
 import json
 from pathlib import Path
 import random
+import resource
 import subprocess
 import sys
 from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
+from crgame_ros.study.data.conducted_study import read_participant
+from crgame_ros.study.data.session_tables import event_rows
 from crgame_ros.study.file import Page, StudyFile
 from crgame_ros.study.folder import StudyFolder
 from crgame_ros.study.participant_session import ParticipantSession
@@ -201,6 +204,38 @@ def test_what_was_said_comes_back_as_it_was(tmp_path: Path) -> None:
         assert [entry['text'] for entry in journal.entries] == [text, 'x']
         journal.add({'entry': 'note', 'at': 3.0, 'text': 'y'})
     assert [entry['text'] for entry in read_journal(tmp_path)] == [text, 'x', 'y']
+
+
+def test_a_note_after_a_killed_program_is_of_no_drive(tmp_path: Path) -> None:
+    for text in ('during', 'after'):
+        with open_session(tmp_path / 'P01') as session:
+            session.note_software({})
+            while not isinstance(session.next_item.what, PlannedTrial):
+                do_next(session)
+            if text == 'during':
+                session.start('runs/1')
+            session.note(text)
+    record = read_participant(read(StudyFile, STUDY, 'study'), tmp_path / 'P01')
+    assert record is not None
+    assert [(row['text'], row.get('trial')) for row in event_rows(record, {})
+            if row['kind'] == 'note'] == [('during', 1), ('after', None)]
+
+
+def test_nothing_of_a_refused_entry_stays(tmp_path: Path) -> None:
+    """It would be written later, or be glued to the next one."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    with SessionJournal(tmp_path) as journal:
+        journal.add({'entry': 'note', 'at': 1.0, 'text': 'a'})
+        resource.setrlimit(resource.RLIMIT_FSIZE, (journal.path.stat().st_size + 20, limits[1]))
+        try:
+            with pytest.raises(InputError, match='cannot be written'):
+                journal.add({'entry': 'note', 'at': 2.0, 'text': 'b' * 100})
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        journal.add({'entry': 'note', 'at': 3.0, 'text': 'c'})
+        assert [entry['text'] for entry in journal.entries] == ['a', 'c']
+    assert [entry['text'] for entry in read_journal(tmp_path)] == ['a', 'c']
+    assert len((tmp_path / JOURNAL).read_bytes().splitlines()) == 2
 
 
 @pytest.mark.parametrize('name', ['007', '1e5', '1E5', '0x1f', '2026-01-02', 'NA', 'nan', 'null',

@@ -3,10 +3,13 @@
 """Scores against examples computed by hand, and the scales' published bounds."""
 
 import math
+from pathlib import Path
 import random
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
+from crgame_ros.study.data.asked_questions import AskedQuestions
+from crgame_ros.study.file import StudyFile
 from crgame_ros.study.question import Answer, ChoiceQuestion, Question
 from crgame_ros.study.questionnaire import (
     load_questionnaire,
@@ -14,6 +17,7 @@ from crgame_ros.study.questionnaire import (
     standard_questionnaires,
 )
 import pytest
+import yaml
 
 RATINGS = {'mental': 70, 'physical': 10, 'temporal': 55, 'performance': 25, 'effort': 60,
            'frustration': 40}
@@ -96,12 +100,25 @@ def test_the_scales_are_there_in_two_languages(name: str) -> None:
     ({'scores': [{'name': 's', 'items': ['a'], 'how': 'tally'}]}, 'give both or none'),
     ({'scores': [{'name': 's', 'items': ['a'], 'how': 'tally', 'pairs': ['a']}]},
      'does not choose between items'),
+    ({'scores': [{'name': 'a', 'items': ['a']}]}, 'has the name of a question'),
     ({'questions': []}, 'give 1 to 200'),
     ({'questions': [{'name': 'a', 'text': {}}, {'name': 'a', 'text': {}}]}, 'there already')])
 def test_what_is_no_questionnaire_is_told(values: dict[str, object], message: str) -> None:
     given = {'name': 'q', 'questions': [{'name': 'a', 'slider': {}}]} | values
     with pytest.raises(InputError, match=message):
         read(Questionnaire, given, 'file')
+
+
+def test_two_of_one_name_have_columns_of_their_own(tmp_path: Path) -> None:
+    """The same ones after each trial."""
+    for number in (1, 2):
+        (tmp_path / f'{number}.yaml').write_text(yaml.safe_dump({
+            'name': 'q', 'questions': [{'name': f'asked_{number}', 'text': {}}]}))
+    study = read(StudyFile, {'name': 'demo', 'blocks': [{
+        'name': 'main', 'repetitions': 3, 'after_trial': [
+            {'questions': '1.yaml'}, {'questions': '2.yaml'}]}]}, 'study', tmp_path)
+    assert [column.name for scale in AskedQuestions(study).after_trials.values()
+            for column in scale.columns('en')] == ['q_asked_1', 'q_2_asked_2']
 
 
 def test_an_unknown_one_is_told() -> None:

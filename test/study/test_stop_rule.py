@@ -95,6 +95,19 @@ def test_a_repeat_can_let_the_block_go_on(tmp_path: Path) -> None:
             'learn/2', 'learn/2/break', 'learn/3', 'learn/4']
 
 
+def test_what_is_done_stays_if_a_repeat_ends_the_block_sooner(tmp_path: Path) -> None:
+    study = study_of(tmp_path / 'study')
+    with ParticipantSession(study, tmp_path / 'P01', 'P01', 0, lambda: next(TIMES)) as session:
+        conduct(session, [1, 0, 1, 0, 0])
+        for item in ('learn/1', 'learn/5'):
+            session.repeat(item, 'a noise')
+            assert conduct(session, [0]) == [item]
+    record = read_participant(study, tmp_path / 'P01')
+    assert record is not None and record.complete
+    assert [*record.counted] == [*(f'learn/{number}' for number in range(1, 6)), 'test/1',
+                                 'test/2']
+
+
 def test_an_answer_can_be_the_success_and_refusals_name_the_key(tmp_path: Path) -> None:
     asked = {'after_trial': [{'questions': 'kinds.yaml'}],
              'stop': {'success': {'question': 'trust', 'at_least': 5}, 'in_a_row': 1}}

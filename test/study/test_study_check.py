@@ -13,7 +13,7 @@ from crgame_ros.game.task_spec import answer_key
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.schema.reading import read
 from crgame_ros.study.check import check_study, length_of
-from crgame_ros.study.conduct.study_drive import StudyDrive
+from crgame_ros.study.conduct.study_drive import StudyDrive, write_drive
 from crgame_ros.study.file import load_study, StudyFile
 from crgame_ros.study.session_script import drives_of, session_of
 from crgame_ros.study.trial_game import trial_game
@@ -146,6 +146,8 @@ def test_tasks_are_for_the_seat_of_the_participant(tmp_path: Path) -> None:
         ]}}, 'tasks drt and over: both are answered by Enter'),
     ({'settings': {'game': CUT_IN, 'duration': 2, 'planner': 'idm', 'options': {'x': 1}},
       'factors': [{'name': 'f', 'levels': [{'name': 'a'}, {'name': 'b'}]}]}, '"x" is unknown'),
+    ({'settings': {'game': CUT_IN, 'duration': 2, 'confederate': 'hv0'}},
+     'gives hv0 to a participant and the experimenter'),
     ({'before': [{'page': 'absent.md'}]}, 'there is no such page'),
     ({'after': [{'questions': 'tlx'}]}, 'there is no questionnaire "tlx"'),
     ({'blocks': [{'name': 'main', 'sequences': [['a', 'c']]}]}, 'names "c", which is no condit'),
@@ -182,15 +184,52 @@ def test_a_scenario_alone_can_be_driven(tmp_path: Path) -> None:
     assert [human.driver for human in first.humans] == ['cockpit']
 
 
+def test_the_length_is_that_of_the_longest_group(tmp_path: Path) -> None:
+    """Only the groups have a game, each of another duration."""
+    study = study_of(tmp_path, settings={}, groups={'name': 'long', 'levels': [
+        {'name': name, 'game': CUT_IN, 'duration': duration}
+        for name, duration in (('no', 2), ('yes', 3))]})
+    assert length_of(study).driving_s == 2 * 3.0
+
+
+def test_what_would_stop_a_session_or_the_tables_is_told(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Also in a study that plans no comparison."""
+    (tmp_path / 'mine.yaml').write_text(yaml.safe_dump({
+        'name': 'own', 'questions': [{'name': 'contacts', 'text': {}}]}))
+    (tmp_path / 'page.md').write_bytes(b'\xff')
+    file = tmp_path / 'study.yaml'
+    for changed, fault in (
+            ({'blocks': [{'name': 'main', 'after_trial': [{'questions': 'mine.yaml'}]}]},
+             'the column own_contacts is there already'),
+            ({'before': [{'page': 'page.md'}]}, 'page.md: cannot be read')):
+        file.write_text(yaml.safe_dump(PLAIN | changed))
+        assert main(['study', 'check', str(file)]) == 2
+        assert fault in capsys.readouterr().err
+
+
+def test_a_drive_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+    (tmp_path / 'games').touch()
+    with pytest.raises(InputError, match='games: cannot be made'):
+        write_drive(session_of(study_of(tmp_path), 0)[0], tmp_path / 'games')
+
+
 def test_a_sequence_is_taken_as_it_is(tmp_path: Path) -> None:
-    study = study_of(tmp_path, blocks=[{'name': 'main', 'sequences': [['a', 'a', 'b'], ['b']]}])
+    study = study_of(tmp_path, blocks=[{'name': 'main', 'sequences': [list('aab'), list('bbb')]}])
     assert [[trial.condition.name for trial in plan_trials(study, place)]
-            for place in range(3)] == [['a', 'a', 'b'], ['b'], ['a', 'a', 'b']]
+            for place in range(3)] == [list('aab'), list('bbb'), list('aab')]
 
 
 @pytest.mark.parametrize(('changed', 'message'), [
     ({'blocks': []}, 'give 1 to 50'), ({'blocks': [{'name': 'a', 'factors': ['x']}]}, '"x"'),
     ({'name': '../x'}, 'letters'), ({'before': [{'page': '/etc/x.md'}]}, 'beside this one'),
+    ({'before': [{'page': 'a/../../x.md'}]}, 'beside this one'),
+    ({'after': [{'questions': '../mine.yaml'}]}, 'beside this one'),
+    ({'exclude': [{'attention_failed': 1, 'page': '../x.md'}]}, 'beside this one'),
+    # Items of its trials would have the ids of steps.
+    ({'blocks': [{'name': 'after'}]}, 'has the name of the steps around all blocks'),
+    ({'blocks': [{'name': 'a', 'sequences': [[]]}]}, 'not equally long, or empty'),
+    ({'blocks': [{'name': 'a', 'sequences': [['a', 'b'], ['a']]}]}, 'not equally long'),
     ({'factors': [{'name': 'f', 'levels': [{'name': 'a'}]}]}, 'give 2 to 50'),
     ({'blocks': [{'name': 'a', 'practice': {'at_least': 3, 'at_most': 2}}]}, 'at_most')])
 def test_what_is_no_study_is_told(tmp_path: Path, changed: dict[str, Any], message: str) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
-from crgame_ros.study.analysis.power import power_lines, power_of, smallest
+from crgame_ros.study.analysis.power import measure_models, power_lines, power_of, smallest
 from crgame_ros.study.file import StudyFile
 import numpy as np
 import pytest
@@ -72,3 +72,26 @@ def test_plans_without_an_effect_or_with_two_deviations_are_refused() -> None:
             {'measure': 'speed', 'factor': 'load', 'effect': 1.0, 'sd': 2.0},
             {'measure': 'speed', 'factor': 'scene', 'contrast': ['a', 'b'], 'effect': 1.0,
              'sd': 9.0}), (8,), 10, 0))
+
+
+def contrast(*levels: str, effect: float = 1.0, **keys: Any) -> dict[str, Any]:
+    """Return a comparison of two scenes, in the unit of the measure."""
+    return {'measure': 'speed', 'factor': 'scene', 'contrast': levels, 'effect': effect,
+            'sd': 2.0, **keys}
+
+
+def test_contrasts_add_up_in_a_row() -> None:
+    study = study_of(contrast('a', 'b'), contrast('b', 'c', effect=2.0))
+    assert measure_models(study)['speed'].effects == {('scene', 'b'): 1.0, ('scene', 'c'): 3.0}
+    for second in (contrast('c', 'b'), contrast('b', 'a'), contrast('a', 'b', effect=2.0)):
+        with pytest.raises(InputError, match=r'comparisons\[1\]: effect: states the effect of'):
+            measure_models(study_of(contrast('a', 'b'), second))
+
+
+def test_tests_that_differ_in_their_alternative_alone_are_two() -> None:
+    study = study_of(contrast('a', 'b', effect=9.0), contrast(
+        'a', 'b', effect=9.0, alternative='greater'))
+    assert measure_models(study)['speed'].effects == {('scene', 'b'): 9.0}
+    [powers] = power_of(study, (8,), 20, 1)
+    assert [(power.name, power.found) for power in powers] == [
+        ('speed, scene: b - a', 1.0), ('speed, scene: b - a > 0', 1.0)]

@@ -102,6 +102,18 @@ def test_blocks_are_ordered_as_conditions_are() -> None:
         read(StudyFile, plain | {'block_sequences': [['first', 'first']]}, 'study')
 
 
+def test_blocks_with_equally_many_conditions_have_orders_of_their_own() -> None:
+    study = read(StudyFile, {
+        'name': 'two', 'seed': 11, 'factors': [
+            {'name': 'a', 'levels': [{'name': name} for name in 'tuvwxyz']}],
+        'blocks': [{'name': name, 'order': 'random'} for name in ('first', 'second')]}, 'study')
+    trials = plan_trials(study, 5)
+    first, second = ([trial.condition.name for trial in trials if trial.block == name]
+                     for name in ('first', 'second'))
+    # That of the first block is as if it were alone.
+    assert first == ['tuvwxyz'[index] for index in order_of('random', 7, 11, 5)] != second
+
+
 def test_each_drive_may_have_a_seed_of_its_own() -> None:
     study = read(StudyFile, {
         'name': 'seeds', 'settings': {'seed': 'each'}, 'factors': [

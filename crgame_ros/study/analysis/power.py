@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import math
 
 from crgame_ros.errors import InputError
-from crgame_ros.study.analysis.planned_tests import planned_tests
+from crgame_ros.study.analysis.planned_tests import planned_tests, PlannedTest
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.planned_analysis import Comparison
 from crgame_ros.study.trial_plan import plan_trials, PlannedTrial
@@ -62,21 +62,26 @@ def power_of(study: StudyFile, counts: Sequence[int], runs: int, seed: int,
     for place, count in enumerate(counts):
         trials = SimulatedTrials(study, planned_people(study, count), models)
         rng = np.random.default_rng((seed, count))
-        hits: dict[tuple[str, str], int] = {}
+        tests: list[PlannedTest] = []
+        hits: Counter[int] = Counter()
         for run in range(runs):
-            for each in planned_tests(study, trials.draw(rng), columns):
-                if each.comparison.effect is not None:
-                    first, second = each.pair
-                    unit = 'sd of the participants in a group' \
-                        if each.comparison.factor == study.between else 'sd of the differences'
-                    unit = unit if each.comparison.sd is None \
-                        else f"in the measure's unit, sd {each.comparison.sd:g}"
-                    key = (f'{each.comparison.measure}, {each.comparison.factor}: '
-                           f'{second} - {first}', f'{each.comparison.effect:g} {unit}')
-                    hits[key] = hits.get(key, 0) + (each.p_holm < alpha)
+            tests = planned_tests(study, trials.draw(rng), columns)
+            hits.update(number for number, each in enumerate(tests) if each.p_holm < alpha)
             progress((place + (run + 1) / runs) / len(counts))
-        yield [Power(count, name, effect, found / runs, *_interval(found, runs))
-               for (name, effect), found in hits.items()]
+        yield [Power(count, *_told(study, each), hits[number] / runs,
+                     *_interval(hits[number], runs))
+               for number, each in enumerate(tests) if each.comparison.effect is not None]
+
+
+def _told(study: StudyFile, test: PlannedTest) -> tuple[str, str]:
+    """Return the name of a test, and its stated effect."""
+    comparison, (first, second) = test.comparison, test.pair
+    unit = 'sd of the participants in a group' if comparison.factor == study.between \
+        else 'sd of the differences'
+    unit = unit if comparison.sd is None else f"in the measure's unit, sd {comparison.sd:g}"
+    side = {'two-sided': '', 'greater': ' > 0', 'less': ' < 0'}[comparison.alternative]
+    return (f'{comparison.measure}, {comparison.factor}: {second} - {first}{side}',
+            f'{comparison.effect:g} {unit}')
 
 
 def _interval(found: int, runs: int) -> tuple[float, float]:
@@ -161,7 +166,8 @@ def measure_models(study: StudyFile, effects: bool = True) -> dict[str, MeasureM
     trials. Where the plan does not state both, the intercepts vary as trials do.
 
     :param effects: whether levels have the effects that the plan states, or none.
-    :raises InputError: if the comparisons of a measure state different standard deviations.
+    :raises InputError: if the comparisons of a measure state different standard deviations, or
+        do not state its effects one after the other.
     """
     trials = _compared_trials(study, 0, study.group_names[0])
     models: dict[str, MeasureModel] = {}
@@ -176,13 +182,19 @@ def measure_models(study: StudyFile, effects: bool = True) -> dict[str, MeasureM
         trial_sd, participant_sd = _sds(within, between, len(trials), measure)
         group_sd = math.hypot(participant_sd, trial_sd / math.sqrt(max(1, len(trials))))
         added: dict[tuple[str, str], float] = {}
-        for _, each in of_measure if effects else ():
+        stated: dict[tuple[str, str], tuple[str, float]] = {}
+        for number, each in of_measure if effects else ():
             if each.effect is not None:
-                second = _pair(study, each)[1]
+                first, second = _pair(study, each)
                 unit = 1.0 if each.sd is not None else group_sd \
                     if each.factor == study.between else trial_sd * _root(study, each, trials)
-                key = each.factor, second
-                added[key] = added.get(key, 0.0) + each.effect * unit
+                effect = first, each.effect * unit
+                stated.setdefault((each.factor, first), ('', 0.0))
+                if stated.setdefault((each.factor, second), effect) != effect:
+                    raise InputError(f'states the effect of {second}, which an entry before it '
+                                     'has', f'analysis: comparisons[{number}]: effect',
+                                     'let the second level of each contrast be a new one')
+                added[each.factor, second] = added.get((each.factor, first), 0.0) + effect[1]
         models[measure] = MeasureModel(trial_sd, participant_sd, added)
     return models
 

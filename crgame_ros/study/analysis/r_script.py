@@ -15,7 +15,8 @@ _HEAD = """\
 #   Rscript analysis.R
 #
 # Needs the packages lme4 and lmerTest for the mixed models.
-trials <- read.csv("trials.csv", na.strings = c("", "NaN"), check.names = FALSE)
+trials <- read.csv("trials.csv", na.strings = c("", "NaN"), check.names = FALSE,
+                   colClasses = c({texts}))
 alpha <- {alpha!r}
 {flagged}
 # Paired test of one measure: each participant's means of two levels, second less first.
@@ -29,7 +30,7 @@ compare <- function(measure, factor, first, second, alternative) {{
   difference <- means[, 2] - means[, 1]
   test <- t.test(difference, alternative = alternative)
   interval <- t.test(difference, conf.level = 1 - alpha)$conf.int
-  rank <- wilcox.test(difference, alternative = alternative)
+  rank <- wilcox.test(difference, alternative = alternative, exact = n <= 50, correct = FALSE)
   d_av <- mean(difference) / mean(c(sd(means[, 1]), sd(means[, 2])))
   data.frame(measure = measure, factor = factor, first = first, second = second, n = n,
              difference = mean(difference), low = interval[1], high = interval[2],
@@ -53,7 +54,7 @@ compare_groups <- function(measure, factor, first, second, alternative) {
   if (min(length(a), length(b)) < 2) return(NULL)
   test <- t.test(b, a, alternative = alternative)
   interval <- t.test(b, a, conf.level = 1 - alpha)$conf.int
-  rank <- wilcox.test(b, a, alternative = alternative)
+  rank <- wilcox.test(b, a, alternative = alternative, exact = min(length(a), length(b)) <= 8)
   pooled <- sqrt(((length(a) - 1) * var(a) + (length(b) - 1) * var(b)) / (n - 2))
   d_s <- (mean(b) - mean(a)) / pooled
   data.frame(measure = measure, factor = factor, first = first, second = second, n = n,
@@ -83,7 +84,11 @@ def r_script(study: StudyFile, columns: Mapping[str, str]) -> str:
                     ']\n')
     # Both kinds of tests are rows of one table.
     more = '' if study.groups is None else ', d_s = NA, g_s = NA'
-    parts = [_HEAD.format(name=study.name, alpha=analysis.alpha, flagged=flagged, more=more)]
+    # Levels such as 01 and T are texts.
+    texts = ',\n                                  '.join(
+        f'{_text(name)} = "character"' for name in ('participant', 'block', *columns.values()))
+    parts = [_HEAD.format(name=study.name, alpha=analysis.alpha, flagged=flagged, more=more,
+                          texts=texts)]
     parts += [_BETWEEN] if study.groups is not None else []
     parts += _tests(study, columns)
     parts += ['\nlibrary(lme4)\nlibrary(lmerTest)\n']

@@ -120,17 +120,20 @@ class LiveDrives:
 
     async def close(self) -> None:
         """End the graph; a present drive does not count."""
-        if self._is_under_way:
-            self._abort_all(self._item, 'the study was ended')
-        self._phase, self._item, self._loaded = DrivePhase.NONE, '', None
-        for rider in self.riders:
-            rider.enter(DriveState())
-        graph, self._graph = self._graph, None
-        if self._director is not None:
-            self._director.close()
-            self._director = None
-        if graph is not None:
-            await asyncio.to_thread(graph.end)
+        try:
+            if self._is_under_way:
+                self._abort_all(self._item, 'the study was ended')
+        finally:
+            # The graph ends even if the journals take no more entries.
+            self._phase, self._item, self._loaded = DrivePhase.NONE, '', None
+            for rider in self.riders:
+                rider.enter(DriveState())
+            graph, self._graph = self._graph, None
+            if self._director is not None:
+                self._director.close()
+                self._director = None
+            if graph is not None:
+                await asyncio.to_thread(graph.end)
 
     @property
     def _is_under_way(self) -> bool:
@@ -301,8 +304,7 @@ class LiveDrives:
         self._deaths_s = [at for at in self._deaths_s if now_s - at < DEATHS_S] + [now_s]
         if len(self._deaths_s) >= MAX_DEATHS:
             self._deaths_s.clear()
-            self._set_phase(DrivePhase.FAILED, item, words, work=DriveWork.NO_START)
-            await self._wait()
+            await self._await_order(item, words, DriveWork.NO_START)
 
     async def _fail(self, item: SessionItem, text: str) -> None:
         """Show the experimenter why an item cannot be driven, and wait for them."""
@@ -312,7 +314,15 @@ class LiveDrives:
         if self._is_under_way:
             self._abort_all(item.id, text)
         self._loaded = None
-        self._set_phase(DrivePhase.FAILED, item.id, text)
+        try:
+            await self._await_order(item.id, text)
+        except _LostGraphError:
+            await self._lose()
+
+    async def _await_order(self, item: str, text: str, work: DriveWork = DriveWork.NONE) -> None:
+        """Show why an item is not driven until somebody has done something about it."""
+        self._news.clear()
+        self._set_phase(DrivePhase.FAILED, item, text, work=work)
         await self._wait()
 
     def _directs(self) -> Director:
@@ -339,10 +349,10 @@ class LiveDrives:
             await self._poll()
 
     async def _wait(self) -> None:
-        """Poll the graph until something changes."""
-        self._news.clear()
+        """Poll the graph until something changes, or has changed since the last time."""
         while not self._news.is_set():
             await self._poll()
+        self._news.clear()
 
     def _set_phase(self, phase: DrivePhase, item: str = '', text: str = '', *,
                    work: DriveWork = DriveWork.NONE, attempt: int = 0,

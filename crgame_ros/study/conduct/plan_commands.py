@@ -100,22 +100,21 @@ def power_command(values: argparse.Namespace) -> int:
     from crgame_ros.study.analysis.power import power_lines
     from crgame_ros.study.file import load_study
     study = load_study(values.file)
-    check_planned_measures(study)
+    check_columns(study)
     print('\n'.join(power_lines(_power(values, study), values.runs)))
     return 0
 
 
-def check_planned_measures(study: 'StudyFile') -> None:
+def check_columns(study: 'StudyFile') -> None:
     """
-    Check that the planned measures are columns of the table of trials.
+    Check that each question has a column of its own, and that the planned measures are columns.
 
-    :raises InputError: naming the comparison.
+    :raises InputError: naming the column or the comparison.
     """
     from crgame_ros.study.data.asked_questions import AskedQuestions
     from crgame_ros.study.data.preregistration import check_measures
     from crgame_ros.study.data.trials_table import declare_trials
-    if study.analysis.comparisons:
-        check_measures(study, declare_trials(study, AskedQuestions(study))[1].columns)
+    check_measures(study, declare_trials(study, AskedQuestions(study))[1].columns)
 
 
 def preregister_command(values: argparse.Namespace) -> int:
@@ -143,7 +142,7 @@ def preregister_command(values: argparse.Namespace) -> int:
         print('\n'.join(differences) or 'the files are those that were registered')
         print(f'SHA-256 {registered.digest}')
         return 1 if differences else 0
-    check_planned_measures(study)
+    check_columns(study)
     power = None
     if values.participants is not None:
         power = SimulatedPower(_power(values, study), values.runs, values.seed)
@@ -167,7 +166,7 @@ def make_command(values: argparse.Namespace) -> int:
     from crgame_ros.study.desk.page_markdown import pictures_of
     from crgame_ros.study.file import load_study
     study = load_study(values.file)
-    check_planned_measures(study)
+    check_columns(study)
     participants = study.participants if values.participants is None else values.participants
     if not 1 <= participants <= _MOST:
         raise InputError(f'is {participants}', '--participants', f'give 1 to {_MOST}')

@@ -147,12 +147,14 @@ async def _conduct(sessions: Sequence[ParticipantSession], request: SessionReque
     finally:
         if driving is not None:
             driving.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await driving
+            # Its error, if it ended with one, is on its way already.
+            await asyncio.wait([driving])
         say('ending: recordings are finished')
-        await drives.close()
-        for runner in runners:
-            await runner.cleanup()
+        try:
+            await drives.close()
+        finally:
+            for runner in runners:
+                await runner.cleanup()
 
 
 async def _until_over(desks: Sequence[Desk], driving: asyncio.Task[None], stop: asyncio.Event,

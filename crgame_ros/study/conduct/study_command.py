@@ -142,13 +142,14 @@ def check_command(values: argparse.Namespace) -> int:
     """
     Check a study.
 
-    :return: 1 if it cannot be run in its present form.
+    :return: 1 if it should not be run in its present form.
     :raises InputError: if the file cannot be read, or names missing things.
     """
     from crgame_ros.recording.progress import Progress
     from crgame_ros.study.check import check_study, length_of
-    from crgame_ros.study.conduct.plan_commands import check_planned_measures
+    from crgame_ros.study.conduct.plan_commands import check_columns
     from crgame_ros.study.data.study_data_command import told_overdue
+    from crgame_ros.study.desk.page_markdown import pictures_of
     from crgame_ros.study.file import load_study
     from crgame_ros.study.session_script import members_of
     from crgame_ros.study.trial_plan import orders_of, told_trials
@@ -158,12 +159,14 @@ def check_command(values: argparse.Namespace) -> int:
     say = partial(print, file=sys.stderr, flush=True)
     for line in told_overdue(study, values.out or Path('studies') / study.name):
         say(f'warning: {line}')
-    check_planned_measures(study)
     findings = check_study(study, Progress(say, 'driving a second of each condition'))
     for finding in findings:
         say(f'{finding.kind}: {finding.text}')
     if any(finding.kind == 'error' for finding in findings):
         return 1
+    check_columns(study)
+    # As `run` reads them.
+    pictures_of(study)
     members = members_of(study)
     if study.groups is not None:
         print(f'groups by {study.groups.name}: {study.groups.told}')
@@ -240,6 +243,7 @@ def serve_command(values: argparse.Namespace) -> int:
     from crgame_ros.study.elsewhere import PlatformIds
     from crgame_ros.study.file import load_study
     from crgame_ros.study.folder import StudyFolder
+    from crgame_ros.study.session_script import members_of
     study = load_study(values.file)
     if study.elsewhere is None:
         raise InputError('sends its participants from no platform', str(values.file),
@@ -251,6 +255,9 @@ def serve_command(values: argparse.Namespace) -> int:
     if study.groups is not None and study.groups.allocation == 'given':
         raise InputError('has groups that you give to each participant', str(values.file),
                          'let chance or a field decide, or take crgame study run')
+    if members_of(study) > 1:
+        raise InputError('is for participants who drive together', str(values.file),
+                         'leave out "seats", or take crgame study run')
     if values.listen is None:
         raise InputError('is missing', '--listen', 'name the address that participants reach')
     if not 1 <= values.capacity <= 100:

@@ -13,6 +13,7 @@ from urllib.parse import urlencode
 
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.driver.source import COCKPIT
+from crgame_ros.errors import InputError
 from crgame_ros.study.drive_watch import DrivePhase, DriveState, DriveWatch
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.quality import Excess, PAGE, TIMING
@@ -20,9 +21,9 @@ from crgame_ros.study.session_journal import SessionEvent
 from crgame_ros.study.session_script import SessionItem, settings_of
 from crgame_ros.study.trial_game import seats_of, trial_game
 from crgame_ros.study.trial_settings import TrialSettings
-from crgame_ros.whole_file import write_whole
+from crgame_ros.whole_file import write_text
 
-# Reasons of complete runs: end of the duration, or the vehicle's own drivability.
+# Reasons of complete runs: end of the duration, or a vehicle's violation of the drivability.
 TIME, DRIVABILITY = 'duration', 'drivability of '
 RESET = 'reset'
 _CUT_SHORT = {'stop': 'the run was stopped by hand', RESET: 'the run was started again by hand',
@@ -49,13 +50,16 @@ def outcome_of(status: RunStatus, seat: str, end_time_s: float) -> dict[str, obj
     :param status: at its end; the drive is complete.
     :param seat: vehicle of the participant.
     :param end_time_s: the run's clock then [s].
-    :return: `outcome`: time, collision or off_road; `end_time_s`; and the numbers of contacts and
-        road departures of the vehicle.
+    :return: `outcome`, one of `OUTCOMES`; `end_time_s`; and the numbers of contacts and road
+        departures of the vehicle.
     """
     contacts, departures = _times(status, seat)
-    outcome = 'time'
-    if status.reason != TIME:
-        # Its own drivability ended it: the later of contact and departure.
+    if status.reason == TIME:
+        outcome = 'time'
+    elif status.reason != f'{DRIVABILITY}{seat}' and not contacts and not departures:
+        outcome = 'other'
+    else:
+        # The later of contact and departure ended it.
         outcome = 'collision' if contacts and contacts[-1] >= max(departures, default=0.0) \
             else 'off_road'
     return {'outcome': outcome, 'end_time_s': round(end_time_s, 6), 'contacts': len(contacts),
@@ -164,16 +168,19 @@ def write_drive(item: SessionItem, games: Path) -> StudyDrive | None:
 
     :param games: folder of the participant's games.
     :return: None if the item is not driven.
-    :raises InputError: if its game cannot be used.
+    :raises InputError: if its game cannot be used or written.
     """
     settings = settings_of(item)
     if settings is None:
         return None
     game = trial_game(settings, COCKPIT)
     path = games / f'{item.id.replace("/", "_")}.yaml'
-    text = game.dump()
-    games.mkdir(parents=True, exist_ok=True)
-    write_whole(text.encode(), path)
+    try:
+        games.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f'cannot be made ({error.strerror})', str(games),
+                         'choose a folder that can be written') from error
+    write_text(game.dump(), path)
     return StudyDrive(item, settings, seats_of(settings, game), path)
 
 

@@ -11,7 +11,6 @@ from crgame_ros.study.data.study_row_table import (
     plain_name,
     question_column,
     score_columns,
-    unlike,
 )
 from crgame_ros.study.file import Questions, StudyFile
 from crgame_ros.study.question import Answer
@@ -68,8 +67,10 @@ class AskedQuestions:
             prefix = f'{place}{scale.name}_'
             if before:
                 prefix = f'{place}{scale.name}_{before + 1}_'
-            if prefix in known and known[prefix].scale != scale:
-                prefix = unlike(prefix.rstrip('_'), (name.rstrip('_') for name in known)) + '_'
+            number = 2
+            while prefix in known and known[prefix].scale != scale:
+                prefix = f'{place}{scale.name}_{number}_'
+                number += 1
             self._by_item[item.id] = known.setdefault(prefix, AskedScale(prefix, scale))
 
     def find(self, item: SessionItem) -> AskedScale | None:

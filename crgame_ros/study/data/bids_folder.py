@@ -199,6 +199,7 @@ def write_bids(data: StudyData, out: Path) -> None:
     labels = _labels(data.records)
     task = _label(data.folder.study.name) or 'study'
     prepare_folder(out)
+    _remove_earlier(out, task)
     title = data.folder.study.title.in_language(data.folder.study.language) \
         or data.folder.study.name
     _json(out / 'dataset_description.json', {
@@ -233,6 +234,19 @@ def write_bids(data: StudyData, out: Path) -> None:
                 'SoftwareName': 'crgame_ros', 'SoftwareVersion': __version__}, **_sidecar()})
         for trial in trials:
             _write_recordings(trial, folder, f'sub-{labels[record.id]}', task, record.begun_at)
+
+
+def _remove_earlier(out: Path, task: str) -> None:
+    """Remove the files of participants and trials, some of which may not count any more."""
+    try:
+        for path in out.glob(f'sub-*/beh/sub-*_task-{task}_*'):
+            path.unlink()
+        for folder in (*out.glob('sub-*/beh'), *out.glob('sub-*')):
+            if not any(folder.iterdir()):
+                folder.rmdir()
+    except OSError as error:
+        raise InputError(f'cannot be removed ({error.strerror})', str(error.filename or out),
+                         'make the folder writable') from error
 
 
 def escaped(value: object) -> str:

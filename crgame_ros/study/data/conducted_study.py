@@ -17,7 +17,14 @@ from crgame_ros.study.followed_session import failed_checks, followed, last_answ
 from crgame_ros.study.groups import Allocation, allocation_of
 from crgame_ros.study.question import Answer
 from crgame_ros.study.questionnaire import questions_of
-from crgame_ros.study.session_journal import DECLINED, JournalEntry, read_journal, SessionEvent
+from crgame_ros.study.session_journal import (
+    DECLINED,
+    done_items,
+    how_ended,
+    JournalEntry,
+    read_journal,
+    SessionEvent,
+)
 from crgame_ros.study.session_script import items_before_groups, session_of, SessionItem
 from crgame_ros.study.staircase import Track
 from crgame_ros.study.trial_plan import PlannedTrial
@@ -195,13 +202,7 @@ class ParticipantRecord:
         """Return whether every item is finished or skipped, and no rule has excluded anybody."""
         if self.exclusion is not None or self._awaits_group:
             return False
-        done: set[str] = set()
-        for entry in self.entries:
-            if entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
-                done.add(entry['item'])
-            elif entry['entry'] == SessionEvent.REPEATED:
-                done.discard(entry['item'])
-        return done >= self.items.keys()
+        return done_items(self.entries).keys() >= self.items.keys()
 
     @property
     def group(self) -> str:
@@ -215,16 +216,15 @@ class ParticipantRecord:
     @property
     def exclusion(self) -> JournalEntry | None:
         """Return the entry by which a rule has excluded the participant; None without one."""
-        return next((entry for entry in self.entries
-                     if entry['entry'] == SessionEvent.EXCLUDED), None)
+        ended = how_ended(self.entries)
+        return ended if ended is not None and ended['entry'] == SessionEvent.EXCLUDED else None
 
     @property
     def part(self) -> Part:
         """Return the participant's part in the study: how far it went, or how it ended."""
         if self.exclusion is not None:
             return 'excluded'
-        ended = next((entry for entry in self.entries
-                      if entry['entry'] == SessionEvent.ENDED), None)
+        ended = how_ended(self.entries)
         if ended is not None:
             return 'declined' if ended.get('reason') == DECLINED else 'ended'
         return 'completed' if self.complete else 'under way'

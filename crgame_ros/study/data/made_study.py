@@ -69,7 +69,7 @@ def make_study(study: StudyFile, file: Path, pictures: Sequence[str], out: Path,
     is_given = study.groups is not None and study.groups.allocation == 'given'
     people = planned_people(study, participants)
     for number, planned in enumerate(people):
-        with ParticipantSession(study, folder.participant(planned.id), planned.id,
+        with ParticipantSession(study, folder.participant(planned.id), planned.id, number,
                                 clock_s=lambda: next(times),
                                 group=planned.group if is_given else None) as session:
             _finish_all(session, answers_rng, lambda person: SimulatedTrials(

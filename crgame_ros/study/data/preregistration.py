@@ -19,6 +19,7 @@ from crgame_ros.study.data.asked_questions import AskedQuestions
 from crgame_ros.study.data.trials_table import declare_trials
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.folder import StudyFolder
+from crgame_ros.study.session_script import members_of
 from crgame_ros.study.trial_order import OrderKind
 from crgame_ros.study.trial_plan import orders_of, told_trials
 from crgame_ros.yaml_text import read_text
@@ -168,7 +169,8 @@ def _orders(study: StudyFile) -> Iterator[str]:
                 f'place{" of their group" if study.groups is not None else ""}. The place of '
                 'a participant who drops out is free again.', '',
                 '| place | trials, in this order |', '|---|---|')
-    for group, place, trials in orders_of(study, -(-study.participants // len(groups))):
+    for group, place, trials in orders_of(
+            study, -(-study.participants // (len(groups) * members_of(study)))):
         told = ', '.join(what if len(study.blocks) == 1 else f'{block}: {what}'
                          for _, block, what in told_trials(trials))
         yield f'| {group} {place + 1} | {told} |'.replace('|  ', '| ')

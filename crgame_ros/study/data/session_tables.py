@@ -94,6 +94,9 @@ def _journal_rows(record: ParticipantRecord) -> Iterator[dict[str, Any]]:
     for entry in record.entries:
         kind, item = entry['entry'], record.items.get(entry.get('item', ''))
         driven = item is not None and isinstance(item.what, PlannedTrial)
+        if kind == SessionEvent.OPENED:
+            # A drive before it was lost with its program.
+            running = None
         row = {'kind': _kind(kind, item),
                'item': None if item is None else item.id, 'wall_s': float(entry['at']),
                'name': entry.get('name') or entry.get('outcome') or entry.get('group') or None,

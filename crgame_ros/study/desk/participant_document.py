@@ -24,8 +24,8 @@ from crgame_ros.study.question import (
     VasQuestion,
 )
 from crgame_ros.study.questionnaire import load_questionnaire, questionnaire_name
-from crgame_ros.study.session_journal import DECLINED, JournalEntry, SessionEvent
-from crgame_ros.study.session_script import Fields, is_driven, PracticeDrives, SessionItem
+from crgame_ros.study.session_journal import DECLINED, how_ended, JournalEntry, SessionEvent
+from crgame_ros.study.session_script import Fields, PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 
 MOST_ENTRIES = 300
@@ -48,7 +48,7 @@ def participant_document(desk: Desk) -> dict[str, object]:
         'study': session.study.title.in_language(language) or session.study.name,
         'participant': session.participant, 'language': language,
         'languages': list(session.study.all_languages), 'item': '' if item is None else item.id,
-        'again': 0 if item is None else _repeats(desk, item),
+        'again': 0 if item is None else session.repeats(item.id),
         'progress': _progress(desk)}
     if item is None or desk.ending:
         how, elsewhere = how_over(desk), session.study.elsewhere
@@ -64,7 +64,7 @@ def participant_document(desk: Desk) -> dict[str, object]:
 
 def how_over(desk: Desk) -> str:
     """Return how a session ended: done, declined, excluded or ended."""
-    ended = _end_of(desk)
+    ended = how_ended(desk.session.journal.entries)
     if ended is None:
         return 'ended' if desk.ending else 'done'
     if ended['entry'] == SessionEvent.EXCLUDED:
@@ -72,14 +72,9 @@ def how_over(desk: Desk) -> str:
     return 'declined' if ended['reason'] == DECLINED else 'ended'
 
 
-def _end_of(desk: Desk) -> JournalEntry | None:
-    return next((entry for entry in desk.session.journal.entries
-                 if entry['entry'] in (SessionEvent.ENDED, SessionEvent.EXCLUDED)), None)
-
-
 def _last_page(desk: Desk) -> list[object]:
     """Return the page for a participant who was excluded; empty without one."""
-    file = (_end_of(desk) or {}).get('page')
+    file = (how_ended(desk.session.journal.entries) or {}).get('page')
     return [] if not file else list(read_tree(desk.session.study, Page(file), desk.language))
 
 
@@ -90,12 +85,6 @@ def _progress(desk: Desk) -> dict[str, int]:
     trials = [item for item in items if isinstance(item.what, PlannedTrial)]
     return {'done': len(done), 'of': len(items),
             'drives_done': sum(item.id in done for item in trials), 'drives': len(trials)}
-
-
-def _repeats(desk: Desk, item: SessionItem) -> int:
-    """Return how often a finished item was repeated."""
-    return sum(entry['entry'] == SessionEvent.REPEATED and entry['item'] == item.id
-               for entry in desk.session.journal.entries)
 
 
 def _item(desk: Desk, item: SessionItem) -> dict[str, object]:
@@ -141,21 +130,8 @@ def _drive(desk: Desk, item: SessionItem) -> dict[str, object]:
                                   and each.what.number < what.number
                                   for each in desk.session.items)
     else:
-        drive['number'] = 1 + practised(desk, item)
+        drive['number'] = 1 + desk.session.practice_drives(item.id)
     return drive
-
-
-def practised(desk: Desk, item: SessionItem) -> int:
-    """Return the number of practice drives of an item since its last repeat."""
-    assert is_driven(item)
-    count = 0
-    for entry in desk.session.journal.entries:
-        if entry.get('item') == item.id:
-            if entry['entry'] == SessionEvent.PRACTISED:
-                count += 1
-            elif entry['entry'] == SessionEvent.REPEATED:
-                count = 0
-    return count
 
 
 def _condition(when: AnswerCondition | None, are_fields: bool) -> dict[str, object] | None:

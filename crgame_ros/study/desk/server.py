@@ -144,6 +144,7 @@ PAGES = {'/': 'desk/participant.html', '/experimenter': 'desk/experimenter.html'
 LINKS = 'desk_links.json'
 # Begins the line with the participant's address.
 PARTICIPANT = 'participant'
+# Of experimenters, and of participants.
 MAX_PAGES = 12
 _STALL_CHECK_S = 0.5
 _ONLY_EXPERIMENTER = "This page is the experimenter's: its address stands on the terminal."
@@ -160,7 +161,8 @@ def create_desk_app(desk: Desk, access: Access, experimenters: Invitations) -> w
     :raises CrgameError: if the pages are not installed.
     """
     keeper, pages = Doorkeeper(), DeskPages(desk)
-    sockets: set[DeskSocket] = set()
+    # Of experimenters, and of participants: neither shuts the other one out.
+    sockets: dict[bool, set[DeskSocket]] = {True: set(), False: set()}
     numbers = count(1)
     app = web.Application(middlewares=[
         guard(access, keeper, lambda request: _is_experimenter(request, access, experimenters)
@@ -171,23 +173,25 @@ def create_desk_app(desk: Desk, access: Access, experimenters: Invitations) -> w
         lambda path: path.startswith('/static/'), lambda request: _frames(request, desk)))
 
     def connector(*, experimenter: bool) -> Handler:
+        own = sockets[experimenter]
+
         async def connect(request: web.Request) -> web.StreamResponse:
             if experimenter and not _is_experimenter(request, access, experimenters):
                 return web.Response(status=403, text=f'{_ONLY_EXPERIMENTER}\n')
-            if len(sockets) >= MAX_PAGES:
+            if len(own) >= MAX_PAGES:
                 return web.Response(status=503, text='Too many pages are open.\n')
             socket = DeskSocket(pages, experimenter=experimenter)
-            sockets.add(socket)
+            own.add(socket)
             try:
                 who = 'experimenter' if experimenter else 'participant'
                 return await socket.run(request, f'{who} {next(numbers)}')
             finally:
-                sockets.discard(socket)
+                own.discard(socket)
         return connect
 
     async def close_all(_: web.Application) -> None:
         await asyncio.gather(*(socket.close(WSCloseCode.GOING_AWAY, 'the session ends')
-                               for socket in sockets))
+                               for socket in (*sockets[True], *sockets[False])))
 
     app.on_shutdown.append(close_all)
     app.router.add_get('/ws/participant', connector(experimenter=False))
