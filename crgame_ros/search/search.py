@@ -17,7 +17,7 @@ from crgame_ros.evaluation.evaluation import BATCH_S, Computing
 from crgame_ros.evaluation.file_names import GRID_FILE, SEARCH_FILE
 from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.evaluation.judging import check_expectations, expectations_of, known_measure
-from crgame_ros.evaluation.plan import EvaluationPlan, parse_plan, PlannerChoice
+from crgame_ros.evaluation.plan import EvaluationPlan, PlannerChoice
 from crgame_ros.evaluation.results.parts import ResultParts
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.game import load_game
@@ -133,7 +133,6 @@ def run_search(folder: Path, computing: Computing, began: Began, told: Told) -> 
     """
     settings = SearchSettings.read(folder)
     place = EvaluationFolder(folder)
-    plan = parse_plan(place.plan_values(), str(folder), place.base)
     grid = _without_variants(place.grid())
     values = grid.scenes[0].values
     space = space_of(values, settings.game)
@@ -142,7 +141,7 @@ def run_search(folder: Path, computing: Computing, began: Began, told: Told) -> 
     with ResultParts(folder, computing.part_cells) as parts, \
             dask_client(computing.scheduler, computing.workers, computing.dashboard) as client:
         check_workers(client)
-        trials = Trials(settings, expectations, place, plan, grid, parts, client, limits, told)
+        trials = Trials(settings, expectations, place, grid, parts, client, limits, told)
         phases = []
         smallest, probability = None, None
         parts_of_budget: tuple[tuple[str, float], ...] = (

@@ -15,6 +15,10 @@ import sys
 import time
 
 from crgame_ros.errors import InputError
+from crgame_ros.evaluation.cell_grid import make_grid
+from crgame_ros.evaluation.file_names import GRID_FILE, VARIANTS_FILE
+from crgame_ros.evaluation.folder import EvaluationFolder
+from crgame_ros.evaluation.plan import EvaluationPlan, PlannerChoice
 from crgame_ros.game.game import load_game
 from crgame_ros.game.variation_spec import Constraint
 from crgame_ros.paths import scenarios_directory
@@ -197,6 +201,22 @@ class ByClosedForm(Trials):
 
 
 SETTINGS = SearchSettings('game.yaml', (Goal('ttc', 1),), sampler='random', batch=1)
+
+
+def test_variants_are_added_to_a_folder_one_batch_after_the_other(tmp_path: Path) -> None:
+    place = EvaluationFolder(tmp_path)
+    plan = EvaluationPlan(games=(str(FAMILY),), planners=(PlannerChoice('idm'),), seeds=[0])
+    grid = make_grid(plan, place.store)
+    place.begin(plan, replace(grid, scenes=(replace(grid.scenes[0], variants=()),)))
+    written = (tmp_path / GRID_FILE).read_bytes()
+    first, second, third = pool_of(family(), 4, 0)[:3]
+    place.add_variants([first, second])
+    with (tmp_path / VARIANTS_FILE).open('a') as stream:
+        # As a machine that fails may leave it.
+        stream.write('\n{"gap": 3')
+    place.add_variants([second, third])
+    assert place.grid().scenes[0].variants == (first, second, third)
+    assert (tmp_path / GRID_FILE).read_bytes() == written
 
 
 def test_constraints_that_nothing_keeps_are_refused() -> None:
