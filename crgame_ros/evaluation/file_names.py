@@ -4,5 +4,5 @@
 
 # Its plan and its cells, the files that these need, and the reports of single cells.
 GRID_FILE, FILES, REPORTS = 'evaluation.json', 'files', 'reports'
-# Settings of a search, which chooses the cells of its evaluation one after the other.
-SEARCH_FILE = 'search.json'
+# Settings of a search, and the variants that it has chosen for its evaluation so far, one a line.
+SEARCH_FILE, VARIANTS_FILE = 'search.json', 'variants.jsonl'

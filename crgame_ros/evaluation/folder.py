@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The folder of an evaluation: its plan and files beside the tables, to repeat any cell."""
 
+from collections.abc import Iterable
+from dataclasses import replace
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +15,13 @@ from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_grid import CellGrid
 from crgame_ros.evaluation.content import ContentStore
-from crgame_ros.evaluation.file_names import FILES, GRID_FILE
+from crgame_ros.evaluation.file_names import FILES, GRID_FILE, VARIANTS_FILE
 from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
 from crgame_ros.recording.export import prepare_folder
 from crgame_ros.recording.run_folder import PACKAGE_FILE
 from crgame_ros.schema.writing import write
+from crgame_ros.variation.space import Variant
 from crgame_ros.version import __version__
 from crgame_ros.whole_file import write_text
 
@@ -47,7 +51,10 @@ class EvaluationFolder:
         if any(self.path.iterdir()) and not (self.path / GRID_FILE).exists() \
                 and {item.name for item in self.path.iterdir()} - {FILES}:
             raise InputError('something else is in it', str(self.path), 'name another folder')
-        self.write_grid(plan, grid)
+        note = {'format': FORMAT, 'version': __version__, 'plan': write(plan),
+                'base': str(plan.base.resolve()),
+                'grid': grid.as_dict()}
+        write_text(json.dumps(note, indent=1) + '\n', self.path / GRID_FILE)
         package = {
             '$schema': PROFILE.format('datapackage'),
             'name': 'evaluation', 'description': 'Cells of an evaluation; SI units and radians.',
@@ -55,16 +62,22 @@ class EvaluationFolder:
         write_text(json.dumps(package, indent=1, ensure_ascii=False) + '\n',
                    self.path / PACKAGE_FILE)
 
-    def write_grid(self, plan: EvaluationPlan, grid: CellGrid) -> None:
+    def add_variants(self, variants: Iterable[Variant]) -> None:
         """
-        Write the plan and the grid over those of before.
+        Add variants to those of the only scene of the grid.
 
         :raises InputError: if the folder cannot be written.
         """
-        note = {'format': FORMAT, 'version': __version__, 'plan': write(plan),
-                'base': str(plan.base.resolve()),
-                'grid': grid.as_dict()}
-        write_text(json.dumps(note, indent=1) + '\n', self.path / GRID_FILE)
+        path = self.path / VARIANTS_FILE
+        try:
+            with path.open('a', encoding='utf-8') as stream:
+                # The line break comes first: it ends a line that was cut off.
+                stream.write(''.join('\n' + json.dumps(each) for each in variants))
+                stream.flush()
+                os.fsync(stream.fileno())
+        except OSError as error:
+            raise InputError(f'cannot be written ({error.strerror})', str(path),
+                             'check the folder and the space in it') from error
 
     def find(self, key: str) -> Cell:
         """
@@ -84,7 +97,15 @@ class EvaluationFolder:
 
         :raises InputError: if the folder holds no evaluation.
         """
-        return CellGrid.from_dict(self._note()['grid'])
+        grid = CellGrid.from_dict(self._note()['grid'])
+        path = self.path / VARIANTS_FILE
+        if not path.exists():
+            return grid
+        scene = grid.scenes[0]
+        # A search that was stopped may have added some again when it went on.
+        lines = dict.fromkeys(path.read_text(encoding='utf-8').split('\n'))
+        return replace(grid, scenes=(replace(scene, variants=(
+            *scene.variants, *(json.loads(line) for line in lines if line.endswith('}')))),))
 
     def plan_values(self) -> dict[str, object]:
         """

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A game from the view of its agents: observations, rewards and the end of episodes."""
 
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 import math
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +15,8 @@ from crgame_ros.game.game import Game
 from crgame_ros.gym.driving_game import AgentSeat, DrivingGame
 from crgame_ros.gym.episode_options import EpisodeOptions, read_options, Start
 from crgame_ros.gym.episode_setups import EpisodeSetups, StartVariation
-from crgame_ros.gym.reward import Decision, GoalWatch, Reward, USUAL_REWARD
+from crgame_ros.gym.reward import Decision, Reward, USUAL_REWARD
+from crgame_ros.gym.scene_painter import ScenePainter
 from crgame_ros.gym.scenes import (
     adapted,
     folder_scenes,
@@ -29,7 +30,7 @@ from crgame_ros.policy.observation import Observation, ObservationHistory, Obser
 from crgame_ros.policy.observation_spec import Depths, ObservationSpec
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.offline import observed_run
-from crgame_ros.simulation.setup import AvSetup
+from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
 
@@ -113,8 +114,8 @@ def make_experiment(
 
     return Experiment(
         SceneSetups(Scenes(chosen.names, load),
-                    read(StartVariation, dict(vary or {}), 'vary'), worlds),
-        tuple(seats), action, read(ObservationSpec, dict(observation or {}), 'observation'),
+                    read(StartVariation, vary or {}, 'vary'), worlds),
+        tuple(seats), action, read(ObservationSpec, observation or {}, 'observation'),
         Reward(USUAL_REWARD if reward is None else reward), tuple(ends), ticks, difficulty)
 
 
@@ -146,15 +147,11 @@ class AgentGame:
     def __init__(self, experiment: Experiment, setups: EpisodeSetups, scene: str,
                  driving: type[DrivingGame] = DrivingGame) -> None:
         self.experiment, self.setups, self.scene = experiment, setups, scene
-        self.game = driving(setups, experiment.seats, experiment.action, experiment.ticks)
+        self.game = driving(setups.base, experiment.seats, experiment.action, experiment.ticks)
         self._observations = [
-            Observation(experiment.observation, seat.vehicle.vehicle, seat.view.things,
-                        setups.base.loaded.scenario)
+            Observation(experiment.observation, seat.vehicle.vehicle, setups.base.loaded.scenario)
             for seat in self.game.seats]
         self._histories = [ObservationHistory(experiment.observation) for _ in self.game.seats]
-        self._goals = {seat.id: GoalWatch(
-            seat.vehicle.planning_problem if isinstance(seat.vehicle, AvSetup) else None,
-            seat.vehicle.vehicle.rear_to_center) for seat in self.game.seats}
         self._criticality: Criticality | None = None
 
     @property
@@ -168,14 +165,18 @@ class AgentGame:
         """Return the agents' seats."""
         return self.game.seats
 
-    def begin(self, seed: int, start: Start | None = None, difficulty: float = 1.0) -> None:
-        """Begin an episode (`DrivingGame.begin`)."""
+    def setup(self, seed: int, start: Start | None, difficulty: float) -> Setup:
+        """Return the setup of an episode (`EpisodeSetups.make`)."""
+        return self.setups.make(seed, {seat.id: seat.guide for seat in self.seats}, start,
+                                difficulty)
+
+    def begin(self, setup: Setup) -> None:
+        """Begin an episode."""
         if self.experiment.reward.is_measured:
-            self._criticality = Criticality(observed_run(self.game.setup))
+            self._criticality = Criticality(observed_run(setup))
         for history in self._histories:
             history.begin()
-        self.game.begin(seed, [] if self._criticality is None else [self._criticality], start,
-                        difficulty)
+        self.game.begin(setup, [] if self._criticality is None else [self._criticality])
 
     def act(self, actions: Mapping[str, object]) -> None:
         """Advance to the next decision (`DrivingGame.act`)."""
@@ -192,11 +193,9 @@ class AgentGame:
 
         :return: (B, …) by part
         """
-        poses: NDArray[np.float64] = np.stack([seat.around.poses for seat in seats])
-        velocities = np.stack([seat.around.velocities for seat in seats])
         return self._observations[number].observe(
-            [seat.state for seat in seats], [seat.place for seat in seats],
-            [seat.guide for seat in seats], poses, velocities)
+            [seat.around for seat in seats], [seat.place for seat in seats],
+            [seat.guide for seat in seats])
 
     def completed(self, number: int, seen: Observed) -> Observed:
         """Return an agent's observation with its history and the mask of its manoeuvres."""
@@ -210,6 +209,14 @@ class AgentGame:
         return [self._outcome(seat, off) for seat, off in zip(
             self.seats, self.game.off_road(), strict=True)]
 
+    def paint(self) -> NDArray[np.uint8]:
+        """Return a picture (H, W, 3) around the first agent."""
+        return self._painter.paint(self.game)
+
+    @cached_property
+    def _painter(self) -> ScenePainter:
+        return ScenePainter(self.setups.base.loaded.scenario.lanelet_network)
+
     def info(self, number: int = 0) -> dict[str, object]:
         """Return an agent's information on the start of the episode."""
         return {'time_s': self.game.time_s, 'seed': self.game.setup.game.seed,
@@ -220,12 +227,11 @@ class AgentGame:
         scheduler = game.simulation.scheduler
         measures = None if self._criticality is None else next(
             tick for tick in self._criticality.latest if tick.subject == seat.row)
-        goal = self._goals[seat.id].is_met(seat.state, scheduler.k(game.simulation.n))
         collision = bool(seat.hit)
         reward, terms = experiment.reward.compute(Decision(
             experiment.ticks * scheduler.time_step_s, seat.before[0], seat.state, seat.place,
-            collision, off_road, goal, measures))
-        happened = {'collision': collision, 'off_road': off_road, 'goal': goal}
+            collision, off_road, seat.goal, measures))
+        happened = {'collision': collision, 'off_road': off_road, 'goal': seat.goal}
         terminated = any(happened[end] for end in experiment.ends)
         time_s = game.time_s
         info = {'time_s': time_s, **happened, 'hit': ','.join(seat.hit), 'terms': terms,
@@ -247,8 +253,9 @@ class Episodes:
 
     def __init__(self, experiment: Experiment) -> None:
         self.experiment = experiment
-        self._games: OrderedDict[EpisodeSetups, AgentGame] = OrderedDict()
-        self.agent = self._game(experiment.setups.scenes.names[0], None, 0)
+        self._game = lru_cache(_KEPT)(self._make_game)
+        first = experiment.setups.scenes.names[0]
+        self.agent = self._game(experiment.setups.of(first, None, 0), first)
 
     def begin(self, seed: int, options: EpisodeOptions) -> AgentGame:
         """
@@ -261,21 +268,17 @@ class Episodes:
             scenes.check(options.scene)
         if difficulty is None:
             difficulty = self.experiment.difficulty
-        self.agent = self._game(options.scene or scenes.pick(seed), difficulty, seed)
-        self.agent.begin(seed, options.start, 1.0 if difficulty is None else difficulty)
+        scene = options.scene or scenes.pick(seed)
+        self.agent = self._game(self.experiment.setups.of(scene, difficulty, seed), scene)
+        self.agent.begin(self.agent.setup(
+            seed, options.start, 1.0 if difficulty is None else difficulty))
         return self.agent
 
-    def _game(self, scene: str, difficulty: float | None, seed: int) -> AgentGame:
-        setups = self.experiment.setups.of(scene, difficulty, seed)
-        if setups not in self._games:
-            try:
-                self._games[setups] = AgentGame(self.experiment, setups, scene)
-            except PlanningError as error:
-                raise InputError(str(error), scene, 'move it out of the scenes') from error
-            if len(self._games) > _KEPT:
-                self._games.popitem(last=False)
-        self._games.move_to_end(setups)
-        return self._games[setups]
+    def _make_game(self, setups: EpisodeSetups, scene: str) -> AgentGame:
+        try:
+            return AgentGame(self.experiment, setups, scene)
+        except PlanningError as error:
+            raise InputError(str(error), scene, 'move it out of the scenes') from error
 
 
 def observed_together(games: Sequence[AgentGame]) -> Observed:

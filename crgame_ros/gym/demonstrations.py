@@ -64,7 +64,7 @@ class Demonstration:
     :param run: name of the run.
     :param seed: of the run's game.
     :param observations: (T + 1) by part.
-    :param actions: (T, 2) `pedals`: means over the time of each decision.
+    :param actions: (T, 2) `pedals`: means over the steps of each decision.
     :param rewards: (T)
     :param terminated: whether it ends by an event, and not with the recording or by time.
     :param times_s: (T + 1) simulated time of each observation [s]
@@ -148,7 +148,7 @@ def demonstration(run: Path, seat: str = 'hv0', **keywords: object) -> Demonstra
     played = agent.game
     assert isinstance(played, PlayedGame)
     played.recorded = recorded = _recorded(bag, seat, setups)
-    agent.begin(game.seed)
+    agent.begin(setups.base)
     steps = setups.base.scheduler.steps_per_tick * experiment.ticks
     last = min(len(recorded.intervals_s), len(recorded.states) - 1,
                (len(recorded.objects) - 1) * setups.base.scheduler.steps_per_tick)
@@ -234,7 +234,7 @@ def write_demonstrations(dataset_id: str, runs: Sequence[Path], seat: str = 'hv0
     if dataset_id in minari.list_local_datasets():
         raise InputError('this data set exists', dataset_id, 'choose another name or version')
     episodes = [demonstration(run, seat, observation=observation, **keywords) for run in runs]
-    spec = read(ObservationSpec, dict(observation or {}), 'observation')
+    spec = read(ObservationSpec, observation or {}, 'observation')
     buffers = [EpisodeBuffer(
         id=number, seed=item.seed, options=None, observations=_by_part(item.observations),
         actions=list(item.actions), rewards=item.rewards.tolist(),

@@ -9,7 +9,7 @@ from crgame_ros.gym.agent_game import AgentGame, Episodes, make_experiment
 from crgame_ros.gym.agent_spaces import action_space, observation_space
 from crgame_ros.gym.episode_options import read_options
 from crgame_ros.gym.episode_setups import SEEDS
-from crgame_ros.gym.scene_painter import FRAMES_PER_S, ScenePainter
+from crgame_ros.gym.scene_painter import FRAMES_PER_S
 from crgame_ros.policy.observation_spec import Numbers
 import gymnasium
 from gymnasium import spaces
@@ -45,7 +45,6 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32] | np.int64]):
             self.experiment.observation, self.experiment.action)
         self.action_space: spaces.Box | spaces.Discrete = action_space(  # type: ignore[assignment]
             self.experiment.action)
-        self._painter: tuple[AgentGame, ScenePainter] | None = None
         self._viewer: PageViewer | None = None
         self._begun = False
 
@@ -88,11 +87,7 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32] | np.int64]):
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture (H, W, 3) in the mode `rgb_array`; None in the mode `human`."""
         self._need_begun()
-        if self.render_mode != 'rgb_array':
-            return None
-        if self._painter is None or self._painter[0] is not self.agent:
-            self._painter = self.agent, ScenePainter(self.agent.game.setup)
-        return self._painter[1].paint(self.agent.game)
+        return self.agent.paint() if self.render_mode == 'rgb_array' else None
 
     def action_masks(self) -> NDArray[np.bool_]:
         """

@@ -14,8 +14,7 @@ from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.outline import Footprint, Primitive
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.gym.av_pilot import AvPilot, stacked
-from crgame_ros.gym.episode_options import Start
-from crgame_ros.gym.episode_setups import EpisodeSetups
+from crgame_ros.gym.reward import GoalWatch
 from crgame_ros.planner.plan_check import TOLERANCE
 from crgame_ros.policy.actions import (
     ActionKind,
@@ -139,6 +138,7 @@ class AgentSeat:
     :param view: view of the world from it.
     :param guide: guide along its route.
     :param inverse: inverse of its powertrain, from acceleration to pedals.
+    :param watch: check of its goal.
     :param manoeuvres: its manoeuvres, if the actions are such.
     :param mask: (5) which of them there are at this decision.
     :param pilot: pilot of an AV; None in a human's seat.
@@ -149,6 +149,7 @@ class AgentSeat:
     :param centers: (T, 3) its centres in the road's coordinates, at the steps since the last
         decision
     :param hit: ids of those that it has touched since then.
+    :param goal: whether it has been at its goal at a scenario step since then.
     :param refusal: why the engine refused its plan, or the manoeuvre is masked; None if neither.
     :param overhang: distance off the road at the start; it applies until the vehicle has been on
         the road [m]
@@ -160,6 +161,7 @@ class AgentSeat:
     view: SeatView
     guide: RouteGuide
     inverse: PedalInverse
+    watch: GoalWatch
     manoeuvres: Manoeuvres | None = None
     pilot: AvPilot | None = None
     around: Surrounded = field(init=False)
@@ -169,6 +171,7 @@ class AgentSeat:
     centers: Array = field(init=False)
     mask: NDArray[np.bool_] = field(init=False)
     hit: tuple[str, ...] = ()
+    goal: bool = False
     refusal: str | None = None
     overhang: float = 0.0
 
@@ -182,24 +185,23 @@ class DrivingGame:
     """
     A game in which agents have some seats; all other vehicles drive as in an offline run.
 
-    :param setups: setups of its episodes.
+    :param setup: setup of any of its episodes, which differ in traffic and in the starts.
     :param seats: ids of the agents' vehicles.
     :param action: kind of the actions.
     :param ticks: number of scenario steps for which an action holds.
     :raises InputError: if there is no such seat, or it does not support these actions.
     """
 
-    def __init__(self, setups: EpisodeSetups, seats: Sequence[str], action: ActionKind,
-                 ticks: int) -> None:
-        setup = setups.base
-        self._setups, self._action, self._ticks = setups, action, ticks
+    def __init__(self, setup: Setup, seats: Sequence[str], action: ActionKind, ticks: int) -> None:
+        self._action, self._ticks = action, ticks
         ids, driven = setup.vehicle_ids, setup.vehicle_descriptions
         transforms = road_transforms(len(setup.humans), [av.transform for av in setup.avs])
         self._transforms = transforms
         self._to_center = np.array([item.rear_to_center for item in driven])
-        if not ticks >= 1 or (action == 'plan' and ticks > 1):
-            raise InputError(f'"ticks" is {ticks}', 'environment',
-                             'give 1 for plans, else a number from 1')
+        if not (isinstance(ticks, int | np.integer) and ticks >= 1) or (
+                action == 'plan' and ticks > 1):
+            raise InputError(f'"ticks" is {ticks!r}', 'environment',
+                             'give 1 for plans, else a whole number from 1')
         self.seats: list[AgentSeat] = []
         for name in seats:
             if name not in ids:
@@ -211,13 +213,13 @@ class DrivingGame:
                 raise InputError('a human drives by pedals, not by plans or manoeuvres', name,
                                  'choose the action acceleration or pedals, or an AV')
             vehicle = setup.vehicles[row]
-            view = SeatView(row, driven, setup.obstacles.descriptions, transforms[row])
+            view = self._view(setup, row)
             problem = vehicle.planning_problem if isinstance(vehicle, AvSetup) else None
             start = view.own(stacked([item.state for item in setup.vehicles]))
             self.seats.append(AgentSeat(
                 name, row, vehicle, view,
                 RouteGuide(setup.loaded.scenario, problem, start, vehicle.vehicle),
-                PedalInverse(vehicle.vehicle),
+                PedalInverse(vehicle.vehicle), GoalWatch(problem, vehicle.vehicle.rear_to_center),
                 None if action != 'manoeuvre' else Manoeuvres(
                     setup.loaded.scenario, problem, start, vehicle.vehicle)))
         self._observers: Sequence[RunObserver] = ()
@@ -238,17 +240,13 @@ class DrivingGame:
         """Return the simulated time since the start [s]."""
         return self.simulation.n * self.simulation.scheduler.dt_s
 
-    def begin(self, seed: int, observers: Sequence[RunObserver] = (), start: Start | None = None,
-              difficulty: float = 1.0) -> None:
+    def begin(self, setup: Setup, observers: Sequence[RunObserver] = ()) -> None:
         """
         Begin an episode.
 
         :param observers: observers of its ticks.
-        :param start: stated start, in place of one that varies.
-        :param difficulty: share of the start's variation that is used.
         """
-        self.setup = setup = self._setups.make(
-            seed, {item.id: item.guide for item in self.seats}, start, difficulty)
+        self.setup = setup
         self.simulation = Simulation(setup)
         self._observers = observers
         agents = {item.row for item in self.seats}
@@ -261,6 +259,8 @@ class DrivingGame:
         self._perceive_every = steps_between_messages(setup.game.timing.rate)
         for seat in self.seats:
             seat.vehicle = setup.vehicles[seat.row]
+            # Agents in traffic have other shapes in each episode.
+            seat.view = self._view(setup, seat.row)
             seat.pilot = None if seat.row < humans else AvPilot(
                 setup, seat.row - humans, self.simulation, seat.view)
             seat.hit, seat.refusal = (), None
@@ -294,7 +294,7 @@ class DrivingGame:
         for seat in self.seats:
             seat.action = checked_action(self._action, actions[seat.id])
             seat.before = seat.state, seat.place
-            seat.hit, seat.refusal = (), None
+            seat.hit, seat.goal, seat.refusal = (), False, None
             if seat.manoeuvres is not None:
                 seat.refusal = seat.manoeuvres.decide(int(seat.action), seat.state)
         ways = [self._tick() for _ in range(self._ticks)]
@@ -324,6 +324,10 @@ class DrivingGame:
             x, y, yaw = centers[-1]
             return road.overhang(x, y, yaw, shape) > seat.overhang + TOLERANCE
         return any(off)
+
+    def _view(self, setup: Setup, row: int) -> SeatView:
+        return SeatView(row, setup.vehicle_descriptions, setup.obstacles.descriptions,
+                        self._transforms[row])
 
     def _tick(self) -> Array:
         """Drive one scenario step; return the vehicles' centres (T, V, 3) at its steps."""
@@ -362,8 +366,10 @@ class DrivingGame:
         for seat in self.seats:
             seat.around = seat.pilot.observe(result, states) if seat.pilot else seat.view.observe(
                 states, self.objects)
+            seat.goal |= seat.watch.is_met(seat.view.own(states),
+                                           self.simulation.scheduler.k(result.n))
         for observer in self._observers:
-            observer.observe(result.n, 0.0, states, result.objects)
+            observer.observe(result.n, 0.0, states, self.objects)
 
     def _plan(self) -> None:
         """Plan for the AVs; for one driven by pedals, only if requests wait for it."""

@@ -59,7 +59,7 @@ def read_options(options: Mapping[str, object] | None) -> EpisodeOptions:
 
     :raises InputError: if a key is unknown, or a value is wrong.
     """
-    return read(EpisodeOptions, dict(options or {}), 'options of reset')
+    return read(EpisodeOptions, options or {}, 'options of reset')
 
 
 def game_at(game: Game, difficulty: float, seed: int) -> Game:

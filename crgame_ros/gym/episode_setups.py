@@ -57,8 +57,9 @@ class EpisodeSetups:
 
     def __init__(self, game: Game, vary: StartVariation, worlds: int | None = None,
                  loaded: LoadedScenario | None = None) -> None:
-        if worlds is not None and not worlds >= 1:
-            raise InputError(f'"worlds" is {worlds}', 'environment', 'give a number from 1')
+        if worlds is not None and not (isinstance(worlds, int | np.integer) and worlds >= 1):
+            raise InputError(f'"worlds" is {worlds!r}', 'environment',
+                             'give a whole number from 1')
         self.base = build_setup(game, loaded)
         self._vary, self._worlds = vary, worlds
         self._placed: dict[int, Setup] = {}
@@ -108,7 +109,7 @@ class EpisodeSetups:
         if not along:
             return state._replace(speed=speed)
         x, y, yaw = transform.to_scenario(np.array(state[:3])).tolist()
-        path, s = guide.driving.path, guide.driving.start_s
+        path, s = guide.first.path, guide.first.start_s
         s, d, heading = path.locate(x, y, s)
         moved = path.poses(np.array([s + along]), np.array([d]))[0]
         moved[2] += yaw - heading

@@ -10,8 +10,8 @@ from crgame_ros.gym.agent_game import AgentGame, Episodes, make_experiment, obse
 from crgame_ros.gym.agent_spaces import action_space, observation_space
 from crgame_ros.gym.driving_env import check_render_mode, Seen
 from crgame_ros.gym.episode_options import EpisodeOptions, read_options
-from crgame_ros.gym.episode_setups import EpisodeSetups, SEEDS
-from crgame_ros.gym.scene_painter import FRAMES_PER_S, ScenePainter
+from crgame_ros.gym.episode_setups import SEEDS
+from crgame_ros.gym.scene_painter import FRAMES_PER_S
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -41,8 +41,9 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
     def __init__(self, num_envs: int = 1, seat: str = 'av0', render_mode: str | None = None,
                  **keywords: Any) -> None:
         check_render_mode(render_mode, self.metadata['render_modes'])
-        if num_envs < 1:
-            raise InputError(f'"num_envs" is {num_envs}', 'environment', 'give a number from 1')
+        if not (isinstance(num_envs, int | np.integer) and num_envs >= 1):
+            raise InputError(f'"num_envs" is {num_envs!r}', 'environment',
+                             'give a whole number from 1')
         self.num_envs, self.render_mode = num_envs, render_mode
         self.experiment = make_experiment((seat,), **keywords)
         self._episodes = [Episodes(self.experiment) for _ in range(num_envs)]
@@ -53,7 +54,6 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._randoms = [seeding.np_random()[0] for _ in range(num_envs)]
         self._over = np.zeros(num_envs, dtype=bool)
-        self._painters: dict[EpisodeSetups, ScenePainter] = {}
 
     def reset(self, *, seed: int | Sequence[int | None] | None = None,
               options: dict[str, object] | None = None) -> tuple[Seen, dict[str, object]]:
@@ -64,18 +64,22 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
             for each.
         :param options: keys of `EpisodeOptions`, for every game: scene, start, difficulty. Games
             that begin anew in `step` have none.
-        :raises InputError: if an option is unknown or wrong.
+        :raises InputError: if an option is unknown or wrong, or there are more or fewer seeds
+            than games.
         """
         wanted = read_options(options)
         seeds: Sequence[int | None]
-        if seed is None or isinstance(seed, int):
-            seeds = [None if seed is None else seed + i for i in range(self.num_envs)]
-        else:
+        if seed is None or isinstance(seed, int | np.integer):
+            seeds = [None if seed is None else int(seed) + i for i in range(self.num_envs)]
+        elif len(seed) == self.num_envs:
             seeds = seed
+        else:
+            raise InputError(f'"seed" has {len(seed)} seeds', 'reset',
+                             f'give one for each of the {self.num_envs} games, or one number')
         infos: dict[str, object] = {}
         for index, own in enumerate(seeds):
             if own is not None:
-                self._randoms[index] = seeding.np_random(own)[0]
+                self._randoms[index] = seeding.np_random(int(own))[0]
             infos = self._begin(index, infos, wanted)
         self._over[:] = False
         return self._seen(), infos
@@ -102,20 +106,11 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         """Return a picture of each game in the mode `rgb_array`."""
         if self.render_mode is None:
             return None
-        return tuple(self._paint(game) for game in self._games)
+        return tuple(game.paint() for game in self._games)
 
     @property
     def _games(self) -> list[AgentGame]:
         return [episodes.agent for episodes in self._episodes]
-
-    def _paint(self, game: AgentGame) -> NDArray[np.uint8]:
-        if game.setups not in self._painters:
-            # No more roads stay in memory than there are games.
-            present = {item.setups for item in self._games}
-            self._painters = {setups: painter for setups, painter in self._painters.items()
-                              if setups in present}
-            self._painters[game.setups] = ScenePainter(game.game.setup)
-        return self._painters[game.setups].paint(game.game)
 
     def _begin(self, index: int, infos: dict[str, object],
                options: EpisodeOptions) -> dict[str, object]:

@@ -100,14 +100,15 @@ class PageViewer:
             raise
         self.url = access.at_port(port).url
         self._epoch = 0
-        self._due_s = 0.0
+        # Of the state shown last: when it was due, and its simulated time.
+        self._due_s = self._shown_s = 0.0
         self._status = RunStatus()
         print(f'the environment is shown at {self.url}', file=sys.stderr, flush=True)
 
     def begin(self, game: DrivingGame) -> None:
         """Show another episode."""
         self._epoch += 1
-        self._due_s = time.monotonic()
+        self._due_s, self._shown_s = time.monotonic(), 0.0
         setup = game.setup
         document = describe_game(setup, epoch=self._epoch)
         scene = scene_document(setup.loaded, setup.descriptions, document)
@@ -122,12 +123,13 @@ class PageViewer:
 
     def show(self, game: DrivingGame) -> None:
         """Show the current state, after waiting for its time."""
+        self._due_s += game.time_s - self._shown_s
+        self._shown_s = game.time_s
         now_s = time.monotonic()
         if now_s - self._due_s > _PATIENCE_S:
             self._due_s = now_s
         time.sleep(max(0.0, self._due_s - now_s))
         scheduler, n = game.simulation.scheduler, game.simulation.n
-        self._due_s += scheduler.time_step_s
         place = frames.Place(self._epoch, n, scheduler.k(n), n * scheduler.dt_s)
         objects = game.objects
         commands = np.array(game.simulation.command_rows, dtype=np.float64).reshape(

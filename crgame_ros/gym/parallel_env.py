@@ -11,7 +11,7 @@ from crgame_ros.gym.agent_spaces import action_space, observation_space
 from crgame_ros.gym.driving_env import check_render_mode, Seen
 from crgame_ros.gym.episode_options import read_options
 from crgame_ros.gym.episode_setups import SEEDS
-from crgame_ros.gym.scene_painter import FRAMES_PER_S, ScenePainter
+from crgame_ros.gym.scene_painter import FRAMES_PER_S
 from crgame_ros.paths import extra_install
 from gymnasium import spaces
 import numpy as np
@@ -60,7 +60,6 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
             for seat in seats}
         self.action_spaces = {seat: action_space(self.experiment.action) for seat in seats}
         self._random = np.random.Generator(np.random.PCG64())
-        self._painter: tuple[AgentGame, ScenePainter] | None = None
 
     def observation_space(self, agent: str) -> spaces.Dict:
         """Return the space of an agent's observations."""
@@ -117,11 +116,7 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture (H, W, 3) around the first agent in the mode `rgb_array`."""
-        if self.render_mode is None:
-            return None
-        if self._painter is None or self._painter[0] is not self._together:
-            self._painter = self._together, ScenePainter(self._together.game.setup)
-        return self._painter[1].paint(self._together.game)
+        return None if self.render_mode is None else self._together.paint()
 
     def _seen(self) -> dict[str, Seen]:
         return {agent: self._together.observed(number)

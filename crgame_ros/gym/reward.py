@@ -19,6 +19,9 @@ from crgame_ros.scenario.exact_values import group_outline
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 
+# At a contact, the braking that avoids it is infinite; what it adds to a reward is not [m/s^2].
+_HARDEST = MEASURES['drac'].most
+
 
 class _Gate(NamedTuple):
     """The time steps and the area in which one of the goal's states can be met."""
@@ -164,10 +167,12 @@ TERMS: dict[str, RewardTerm] = {
                          lambda it: it.shortage('ttc_2d', USUAL.ttc_s), True),
     'min_distance': RewardTerm('-', 'shortage of the distance to everybody below 2 m, 0 to 1',
                                lambda it: it.shortage('min_distance', 2.0), True),
-    'drac': RewardTerm(MEASURES['drac'].unit, MEASURES['drac'].definition,
-                       lambda it: it.worst('drac'), True),
-    'a_req': RewardTerm(MEASURES['a_req'].unit, 'braking that just avoids contact, above 0',
-                        lambda it: -min(0.0, it.worst('a_req')), True)}
+    'drac': RewardTerm(MEASURES['drac'].unit,
+                       f'{MEASURES["drac"].definition}, at most {_HARDEST:g}',
+                       lambda it: min(it.worst('drac'), _HARDEST), True),
+    'a_req': RewardTerm(MEASURES['a_req'].unit, 'braking that just avoids contact, above 0, at '
+                        f'most {_HARDEST:g}', lambda it: min(-min(0.0, it.worst('a_req')),
+                                                             _HARDEST), True)}
 USUAL_REWARD = {'progress': 0.05, 'offset': -0.02, 'jerk': -0.0002, 'collision': -10.0,
                 'off_road': -10.0, 'goal': 5.0}
 

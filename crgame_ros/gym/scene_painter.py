@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws a game from above, fast enough for every step."""
 
+from commonroad.scenario.lanelet import LaneletNetwork
 from crgame_ros.geometry.outline import outline, placed_at
 from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.gym.driving_game import DrivingGame
 from crgame_ros.roads.surface import lanelet_areas
-from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
@@ -29,19 +29,15 @@ class ScenePainter:
     """
     A painter of games on one road, north up, centred on the first agent's vehicle.
 
-    :param setup: setup of any episode.
+    :param network: the road.
     """
 
-    def __init__(self, setup: Setup) -> None:
-        network = setup.loaded.scenario.lanelet_network
+    def __init__(self, network: LaneletNetwork) -> None:
         self._lanelets = [np.concatenate((item.left_vertices[:, :2],
                                           item.right_vertices[::-1, :2]))
                           for item in network.lanelets]
         areas = lanelet_areas(list(network.lanelets))
         self._tree = shapely.STRtree(areas)
-        self._outlines = [outline(item.shape) for item in setup.descriptions]
-        self._to_center = [item.vehicle.rear_to_center for item in setup.vehicles]
-        self._humans = len(setup.humans)
 
     def paint(self, game: DrivingGame) -> NDArray[np.uint8]:
         """Return a picture (HEIGHT, WIDTH, 3) of the current state."""
@@ -55,16 +51,17 @@ class ScenePainter:
         for index in sorted(self._tree.query(window).tolist()):
             draw.polygon(_pixels(self._lanelets[index], middle), fill=ROAD, outline=LINE)
         self._paint_route(draw, game, middle)
-        poses = game.objects.poses
+        poses, things = game.objects.poses, game.setup.obstacles.descriptions
         near = np.abs(poses[:, :2] - middle).max(axis=1) < half.max() + 20.0
         for index in np.flatnonzero(near).tolist():
-            draw.polygon(_pixels(placed_at(self._outlines[len(states) + index],
+            draw.polygon(_pixels(placed_at(outline(things[index].shape),
                                            *poses[index].tolist()), middle), fill=OBJECT)
         agents = {item.row for item in game.seats}
-        for row, state in enumerate(states):
-            x, y = ahead(state.x, state.y, state.yaw, self._to_center[row])
-            colour = AGENT if row in agents else HUMAN if row < self._humans else AV
-            draw.polygon(_pixels(placed_at(self._outlines[row], x, y, state.yaw), middle),
+        for row, (state, setup) in enumerate(zip(states, game.setup.vehicles, strict=True)):
+            vehicle = setup.vehicle
+            x, y = ahead(state.x, state.y, state.yaw, vehicle.rear_to_center)
+            colour = AGENT if row in agents else HUMAN if row < len(game.setup.humans) else AV
+            draw.polygon(_pixels(placed_at(outline(vehicle.shape), x, y, state.yaw), middle),
                          fill=colour, outline=(34, 34, 34))
         return np.asarray(image)
 

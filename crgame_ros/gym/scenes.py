@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scenes of an environment: one game, or a folder of them with a train and a test split."""
 
-from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -195,7 +195,8 @@ class SceneSetups:
     def __init__(self, scenes: Scenes, vary: StartVariation, worlds: int | None) -> None:
         self.scenes = scenes
         self._vary, self._worlds = vary, worlds
-        self._made: OrderedDict[tuple[str, float | None], EpisodeSetups] = OrderedDict()
+        self._plain = lru_cache(_KEPT)(self._make_plain)
+        self._thinned = lru_cache(_KEPT)(self._at)
 
     def of(self, name: str, difficulty: float | None, seed: int) -> EpisodeSetups:
         """
@@ -204,28 +205,21 @@ class SceneSetups:
         :param seed: of the episode, for what the game's `vary:` lists.
         :raises InputError: naming the file, if it cannot be used.
         """
-        plain = self._stored((name, None), lambda: EpisodeSetups(
-            self.scenes.load(name), self._vary, self._worlds))
+        plain = self._plain(name)
         if difficulty is None:
             return plain
+        # Of what `vary:` lists, each seed has a variant of its own.
+        return self._at(name, difficulty, seed) if plain.base.game.vary \
+            else self._thinned(name, difficulty)
+
+    def _make_plain(self, name: str) -> EpisodeSetups:
+        return EpisodeSetups(self.scenes.load(name), self._vary, self._worlds)
+
+    def _at(self, name: str, difficulty: float, seed: int = 0) -> EpisodeSetups:
+        plain = self._plain(name)
         given = plain.base.game
         game = game_at(given, difficulty, seed)
         if game == given:
             return plain
-        if given.vary:
-            # Each seed has a variant of its own.
-            return self._other(plain, game)
-        return self._stored((name, difficulty), lambda: self._other(plain, game))
-
-    def _other(self, plain: EpisodeSetups, game: Game) -> EpisodeSetups:
-        loaded = plain.base.loaded if game.scenario == plain.base.game.scenario else None
+        loaded = plain.base.loaded if game.scenario == given.scenario else None
         return EpisodeSetups(game, self._vary, self._worlds, loaded)
-
-    def _stored(self, key: tuple[str, float | None],
-                make: Callable[[], EpisodeSetups]) -> EpisodeSetups:
-        if key not in self._made:
-            self._made[key] = make()
-            if len(self._made) > _KEPT:
-                self._made.popitem(last=False)
-        self._made.move_to_end(key)
-        return self._made[key]

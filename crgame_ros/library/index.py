@@ -7,7 +7,7 @@ Nothing is unpacked: members are read into memory, up to the size of a scenario,
 for is kept in the user's cache under the digest of its content. A member's name is never a path.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 import contextlib
 from contextlib import contextmanager
 import gzip
@@ -51,14 +51,12 @@ class FolderIndex:
     def __init__(self, place: Path) -> None:
         self.place = place
 
-    def entries(self, *, trusting: bool,
-                tell: Callable[[int], object] = lambda _: None) -> list[Entry]:
+    def entries(self, *, trusting: bool) -> list[Entry]:
         """
         Return the scenarios in the order of their paths.
 
         :param trusting: whether a folder whose time of change is the known one is not read. That
             time tells of files that come and go, not of a change within the clock's resolution.
-        :param tell: called with the number of files seen so far.
         :raises InputError: if the folder cannot be read, or holds too many files.
         """
         before = load_index(self.place)
@@ -75,7 +73,6 @@ class FolderIndex:
             if count > MOST_FILES:
                 raise InputError(f'holds more than {MOST_FILES} XML files', str(self.place),
                                  'name the folder with the scenarios')
-            tell(count)
             pending += [f'{name}{inside}/' for inside in folder['folders']]
         if after != before:
             save_index(self.place, after)
@@ -181,15 +178,13 @@ class ArchiveIndex:
         self.place = place
         self._rows: dict[str, _Row] = {}
 
-    def entries(self, *, trusting: bool,
-                tell: Callable[[int], object] = lambda _: None) -> list[Entry]:
+    def entries(self, *, trusting: bool) -> list[Entry]:
         """
         Return the scenarios in the order of their names.
 
         They are read again if time of change or size of the archive differ.
 
         :param trusting: for folders; an archive is always believed by its time and size.
-        :param tell: called with the number of members seen so far.
         :raises InputError: if the archive cannot be read, or holds too much.
         """
         with self._readable():
@@ -198,7 +193,7 @@ class ArchiveIndex:
             known = load_index(self.place)
             if known.get('stamp') != stamp:
                 read = self._zipped if self._is_zip else self._tarred
-                known = {'stamp': stamp, 'members': dict(read(tell))}
+                known = {'stamp': stamp, 'members': dict(read())}
                 save_index(self.place, known)
         self._rows = {name: _Row(*row) for name, row in known['members'].items()}
         return [Entry(self.place, name, row.header_id)
@@ -241,12 +236,12 @@ class ArchiveIndex:
     def _is_zip(self) -> bool:
         return self.place.name.lower().endswith('.zip')
 
-    def _zipped(self, tell: Callable[[int], object]) -> Iterator[tuple[str, _Row]]:
+    def _zipped(self) -> Iterator[tuple[str, _Row]]:
         with zipfile.ZipFile(self.place) as archive:
             for number, member in enumerate(archive.infolist()):
                 self._check_count(number)
-                tell(number)
                 if member.is_dir() or member.flag_bits & _ENCRYPTED \
+                        or not member.filename.isprintable() \
                         or not may_be_scenario(member.filename, member.file_size):
                     continue
                 with archive.open(member) as stream:
@@ -254,15 +249,14 @@ class ArchiveIndex:
                 if found is not None:
                     yield member.filename, _Row(found, '', 0, member.file_size)
 
-    def _tarred(self, tell: Callable[[int], object]) -> Iterator[tuple[str, _Row]]:
+    def _tarred(self) -> Iterator[tuple[str, _Row]]:
         with self._tar_stream() as stream, tarfile.open(fileobj=stream, mode='r:') as archive:
             for number, member in enumerate(archive):
                 self._check_count(number)
-                tell(number)
                 if member.offset_data + member.size > _MOST_BYTES:
                     raise InputError(f'holds more than {_MOST_BYTES // 2 ** 30} GiB',
                                      str(self.place), 'unpack it, and name the folder')
-                if not member.isreg() or member.issparse() \
+                if not member.isreg() or member.issparse() or not member.name.isprintable() \
                         or not may_be_scenario(member.name, member.size):
                     continue
                 body = archive.extractfile(member)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finds scenarios by their benchmark ids in folders and archives that the user has named."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from fnmatch import fnmatchcase
 import logging
 import os
@@ -64,6 +64,8 @@ def find_scenarios(names: Sequence[str], base: Path = Path()) -> tuple[str, ...]
 
     :raises InputError: if an id or a pattern is in none of the places.
     """
+    ids = [name for name in names if not names_file(name, base) and not _PATTERN.search(name)]
+    paths = _scenarios_of(ids)
     found: list[str] = []
     for name in names:
         if names_file(name, base):
@@ -71,7 +73,7 @@ def find_scenarios(names: Sequence[str], base: Path = Path()) -> tuple[str, ...]
         elif _PATTERN.search(name):
             found += map(str, scenarios_like(name))
         else:
-            found.append(str(scenario_of(name)))
+            found.append(str(paths[name]))
     return tuple(found)
 
 
@@ -89,15 +91,24 @@ def scenario_of(benchmark_id: str) -> Path:
 
     :raises InputError: if no place has it.
     """
-    hits = _hits(benchmark_id, trusting=True)
-    if not hits or not all(hit.place.is_current(hit.entry) for hit in hits):
+    return _scenarios_of([benchmark_id])[benchmark_id]
+
+
+def _scenarios_of(ids: Collection[str]) -> dict[str, Path]:
+    """Return the files of scenarios as `scenario_of` does; each index is read once for all."""
+    hits = _hits(ids, trusting=True)
+    doubtful = [name for name, found in hits.items()
+                if not found or not all(hit.place.is_current(hit.entry) for hit in found)]
+    if doubtful:
         # The times of folders may hide a change, and say nothing of changes within files.
-        hits = _hits(benchmark_id, trusting=False)
-    if not hits:
-        raise _unknown(benchmark_id)
-    path = hits[0].place.path_of(hits[0].entry)
-    _warn_of_others(benchmark_id, hits)
-    return path
+        hits |= _hits(doubtful, trusting=False)
+    paths = {}
+    for name, found in hits.items():
+        if not found:
+            raise _unknown(name)
+        paths[name] = found[0].place.path_of(found[0].entry)
+        _warn_of_others(name, found)
+    return paths
 
 
 def scenarios_like(pattern: str) -> list[Path]:
@@ -129,17 +140,16 @@ def _present() -> Iterator[Index]:
             yield index_of(place)
 
 
-def _hits(benchmark_id: str, *, trusting: bool) -> list[_Hit]:
-    """Return the scenarios of an id: those of this file name, else those with this id in them."""
-    named: list[_Hit] = []
-    headed: list[_Hit] = []
-    for index in _present():
+def _hits(ids: Collection[str], *, trusting: bool) -> dict[str, list[_Hit]]:
+    """Return the scenarios of ids: those of this file name, else those with this id in them."""
+    named: dict[str, list[_Hit]] = {name: [] for name in ids}
+    headed: dict[str, list[_Hit]] = {name: [] for name in ids}
+    for index in _present() if ids else ():
         for entry in index.entries(trusting=trusting):
-            if entry.id == benchmark_id:
-                named.append(_Hit(index, entry))
-            elif entry.header_id == benchmark_id:
-                headed.append(_Hit(index, entry))
-    return named or headed
+            for found, name in ((named, entry.id), (headed, entry.header_id)):
+                if name in found:
+                    found[name].append(_Hit(index, entry))
+    return {name: named[name] or headed[name] for name in named}
 
 
 def _warn_of_others(benchmark_id: str, hits: Sequence[_Hit]) -> None:

@@ -371,6 +371,8 @@ def _leaders(obstacles: PathObstacles, request: PlanRequest, s: float,
         let_in = np.full(len(blocking), math.inf)
         coming = np.logical_or.accumulate(blocking[::-1])[::-1]
         rear = obstacles.rear[:, column]
+        # Nobody is there before it appears.
+        coming &= np.isfinite(rear)
         if not blocking[0]:
             steps = np.flatnonzero(blocking)
             first, last = steps[0], steps[-1]

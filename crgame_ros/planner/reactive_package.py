@@ -5,7 +5,7 @@
 import math
 from typing import ClassVar
 
-from crgame_ros.errors import PlanningError
+from crgame_ros.errors import InputError, PlanningError
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.path_planner import check_positive, PathPlanner
@@ -33,7 +33,10 @@ class ReactivePackagePlanner(PathPlanner):
     name: ClassVar[str] = 'reactive-package'
 
     def __init__(self, v0: float | None = None, horizon: float = 6.0, levels: int = 4) -> None:
-        check_positive(self.name, v0=v0, horizon=horizon, levels=levels - 1)
+        check_positive(self.name, v0=v0, horizon=horizon)
+        if not levels >= 2:
+            raise InputError(f'"levels" is {levels!r}', f'options of planner {self.name}',
+                             'give 2 or more')
         self._v0 = v0
         self._horizon = horizon
         self._levels = levels

@@ -2,14 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A picture of a vehicle's surroundings from above, as a part of its policy's observation."""
 
-from collections.abc import Sequence
 import math
 
 from commonroad.scenario.lanelet import LaneletNetwork
-from crgame_ros.game.objects import ObjectDescription
-from crgame_ros.geometry.outline import outline, placed
+from crgame_ros.geometry.outline import placed
 from crgame_ros.geometry.polyline import ReferencePath
-from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.policy.seat_view import Surrounded
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
@@ -31,33 +29,28 @@ class BirdView:
     :param size: height and width [px]
     :param pixel: side of a pixel [m]
     :param network: the roads.
-    :param things: (N) all other objects that can appear.
     """
 
-    def __init__(self, size: int, pixel: float, network: LaneletNetwork,
-                 things: Sequence[ObjectDescription]) -> None:
+    def __init__(self, size: int, pixel: float, network: LaneletNetwork) -> None:
         self._size, self._pixel = size, pixel
         self._lanelets = [np.concatenate((item.left_vertices[:, :2],
                                           item.right_vertices[::-1, :2]))
                           for item in network.lanelets]
         self._tree = shapely.STRtree([
             shapely.box(*points.min(axis=0), *points.max(axis=0)) for points in self._lanelets])
-        self._outlines = [outline(item.shape) for item in things]
-        self._radii = np.array([item.shape.radius for item in things])
         # From the rear axle to the farthest corner [m].
         self._reach = pixel * size * math.hypot(AXLE, 0.5)
         self._ahead = np.arange(0.0, pixel * size * AXLE + pixel, max(pixel, 1.0))
 
-    def paint(self, state: VehicleState, path: ReferencePath, s: float,
-              poses: Array) -> NDArray[np.uint8]:
+    def paint(self, around: Surrounded, path: ReferencePath, s: float) -> NDArray[np.uint8]:
         """
         Return a picture (3, H, W).
 
-        :param state: of the rear axle.
+        :param around: the vehicle and its surroundings.
         :param path: the route.
         :param s: arc length on it [m]
-        :param poses: (N, 3) centres of the things; NaN where absent
         """
+        state, poses, things = around.state, around.poses, around.things
         middle = np.array(state[:2])
         cos, sin = math.cos(state.yaw) / self._pixel, math.sin(state.yaw) / self._pixel
         # Rows count backwards, columns to the right; integers are the middles of pixels.
@@ -77,6 +70,6 @@ class BirdView:
         if len(poses):
             apart = np.hypot(*(poses[:, :2] - middle).T)
             # In this form, NaN counts as far away.
-            for index in np.flatnonzero(apart < self._reach + self._radii).tolist():
-                draw.polygon(pixels(placed(self._outlines[index], poses[index])), fill=INSIDE)
+            for index in np.flatnonzero(apart < self._reach + things.radii).tolist():
+                draw.polygon(pixels(placed(things.outlines[index], poses[index])), fill=INSIDE)
         return np.stack([np.asarray(channel) for channel in (road, route, objects)])

@@ -11,11 +11,10 @@ from collections import deque
 from collections.abc import Sequence
 
 from commonroad.scenario.scenario import Scenario
-from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import SensorSpec
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.reference_point import ahead, seen_from
-from crgame_ros.perception.sensors import create_sensor, SensedBodies
+from crgame_ros.perception.sensors import create_sensor
 from crgame_ros.policy.bird_view import BirdView
 from crgame_ros.policy.observation_spec import (
     Numbers,
@@ -26,6 +25,7 @@ from crgame_ros.policy.observation_spec import (
     STATE_COLUMNS,
 )
 from crgame_ros.policy.route_guide import RouteGuide, RoutePlace
+from crgame_ros.policy.seat_view import Surrounded
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
@@ -37,60 +37,54 @@ Observed = dict[str, Numbers]
 
 class Observation:
     """
-    The observation of one kind of vehicle among the same objects.
+    The observation of one kind of vehicle on the same roads.
 
     :param spec: parts of the observation.
     :param vehicle: parameters of the vehicle.
-    :param things: (N) all other objects that can appear; each call gives those that are present.
     :param scenario: with the roads, for the image.
     """
 
     def __init__(self, spec: ObservationSpec, vehicle: VehicleParameters,
-                 things: Sequence[ObjectDescription], scenario: Scenario) -> None:
+                 scenario: Scenario) -> None:
         self.spec = spec
         self._bounds = {part: spec.bounds_now(part) for part in spec.parts}
         self._ones = {part: spec.ones(part) for part in spec.parts if part != 'image'}
-        self._sizes = np.array([(item.shape.length, item.shape.width) for item in things]
-                               ).reshape(-1, 2)
         self._ahead: Array = spec.route_spacing * np.arange(
             1, spec.route_points + 1, dtype=np.float64)
         self._to_center = vehicle.rear_to_center
         if 'lidar' in spec.parts:
             self._lidar = create_sensor(SensorSpec(
                 'lidar', field_of_view=2.0 * np.pi, horizon=spec.horizon, rays=spec.rays))
-            self._bodies = SensedBodies(things)
         if 'image' in spec.parts:
-            self._bird = BirdView(spec.image_size, spec.pixel, scenario.lanelet_network, things)
+            self._bird = BirdView(spec.image_size, spec.pixel, scenario.lanelet_network)
 
-    def observe(self, states: Sequence[VehicleState], places: Sequence[RoutePlace],
-                guides: Sequence[RouteGuide], poses: Array, velocities: Array) -> Observed:
+    def observe(self, around: Sequence[Surrounded], places: Sequence[RoutePlace],
+                guides: Sequence[RouteGuide]) -> Observed:
         """
         Return the observations of B vehicles.
 
-        :param states: (B) rear axle, scenario coordinates.
+        :param around: (B) vehicles and their surroundings, each of N objects.
         :param places: (B) on their routes.
         :param guides: (B) of their routes.
-        :param poses: (B, N, 3) centres of the things, in the same coordinates; NaN where absent
-        :param velocities: (B, N, 3)
         :return: by part, (B, …) as in `ObservationSpec.bounds_now`, within them.
         """
+        states = [each.state for each in around]
         own = np.array(states, dtype=np.float64)[:, :3]
         made: Observed = {}
         for part in self.spec.parts:
             if part == 'image':
                 made[part] = np.stack([
-                    self._bird.paint(state, guide.driving.path, place.s, around)
-                    for state, place, guide, around in zip(states, places, guides, poses,
-                                                           strict=True)])
+                    self._bird.paint(each, guide.driving.path, place.s)
+                    for each, place, guide in zip(around, places, guides, strict=True)])
                 continue
             if part == 'state':
                 values = _state(states, places)
             elif part == 'route':
                 values = self._route(own, places, guides)
             elif part == 'objects':
-                values = self._objects(own, poses, velocities)
+                values = self._objects(own, around)
             else:
-                values = self._ranges(states, poses)
+                values = self._ranges(around)
             low, high = self._bounds[part]
             if self.spec.scaled:
                 values = values / self._ones[part]
@@ -108,7 +102,10 @@ class Observation:
         result[..., 3] = points[..., 3]
         return result
 
-    def _objects(self, own: Array, poses: Array, velocities: Array) -> Array:
+    def _objects(self, own: Array, around: Sequence[Surrounded]) -> Array:
+        poses: Array = np.stack([each.poses for each in around])
+        velocities, sizes = (np.stack([each.velocities for each in around]),
+                             np.stack([each.things.sizes for each in around]))
         rows, wanted = np.arange(len(own))[:, None], self.spec.objects
         result = np.zeros((len(own), wanted, len(OBJECT_COLUMNS)))
         if not poses.shape[1]:
@@ -127,16 +124,17 @@ class Observation:
             seen[..., column] = vectors[..., 0] * cos + vectors[..., 1] * sin
             seen[..., column + 1] = vectors[..., 1] * cos - vectors[..., 0] * sin
         seen[..., 3] = wrap_pi_array(poses[rows, nearest, 2] - own[:, 2, None])
-        seen[..., 6:] = self._sizes[nearest]
+        seen[..., 6:] = sizes[rows, nearest]
         seen[~there] = 0.0
         return result
 
-    def _ranges(self, states: Sequence[VehicleState], poses: Array) -> Array:
-        result = np.empty((len(states), self.spec.rays))
-        for row, state, around in zip(result, states, poses, strict=True):
-            self._bodies.poses = around
+    def _ranges(self, around: Sequence[Surrounded]) -> Array:
+        result = np.empty((len(around), self.spec.rays))
+        for row, each in zip(result, around, strict=True):
+            state, bodies = each.state, each.things.bodies
+            bodies.poses = each.poses
             x, y = ahead(state.x, state.y, state.yaw, self._to_center)
-            scan = self._lidar.scan((x, y, state.yaw), self._bodies)
+            scan = self._lidar.scan((x, y, state.yaw), bodies)
             row[:] = np.minimum(scan.ranges, self.spec.horizon)
         return result
 

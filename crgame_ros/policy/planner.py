@@ -36,8 +36,7 @@ class PolicyPlanner(Planner):
         """Plan the route, and run the policy once, because its first call may take long."""
         self._context = context
         self._view = RequestView(context.vehicle_id, context.objects)
-        self._observation = Observation(self._policy.spec, context.vehicle, self._view.things,
-                                        context.scenario)
+        self._observation = Observation(self._policy.spec, context.vehicle, context.scenario)
         self._history = ObservationHistory(self._policy.spec)
         start = initial_state(context)
         self._guide = RouteGuide(context.scenario, context.planning_problem, start,
@@ -58,12 +57,12 @@ class PolicyPlanner(Planner):
         """Plan a new action, or the held one, from the vehicle's present state."""
         decided, place = self._decided_k, self._guide.follow(request.ego)
         if decided is None or not 0 < request.k - decided < self._policy.ticks:
-            self._decided_k = request.k
-            around = self._view.observe(request)
-            seen = self._observation.observe([request.ego], [place], [self._guide],
-                                             around.poses[None], around.velocities[None])
+            seen = self._observation.observe([self._view.observe(request)], [place],
+                                             [self._guide])
             self._decide(request.ego, self._history.add(
                 {part: values[0] for part, values in seen.items()}))
+            # After it, so that a policy that fails is asked again and its last action not held.
+            self._decided_k = request.k
         if self._manoeuvres is not None:
             return Plan(request.stamp_ns, self._manoeuvres.plan(request.ego, request.time_step_s))
         states = planned_states(

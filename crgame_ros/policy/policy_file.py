@@ -51,7 +51,7 @@ class Policy:
     @property
     def spec(self) -> ObservationSpec:
         """Return the specification of its observation."""
-        return read(ObservationSpec, dict(self.observation), 'observation of the policy')
+        return read(ObservationSpec, self.observation, 'observation of the policy')
 
 
 def load_policy(name: str, where: str = '') -> Policy:

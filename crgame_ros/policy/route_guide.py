@@ -53,6 +53,20 @@ class RoutePlace(NamedTuple):
     progress: float
 
 
+class _Route(NamedTuple):
+    """
+    A planned route.
+
+    :param driving: its path.
+    :param limits: speed limits at the path's points [m/s]
+    :param goal_s: arc length at which it reaches the goal; inf without one [m]
+    """
+
+    driving: DrivingPath
+    limits: list[float]
+    goal_s: float
+
+
 class RouteGuide:
     """
     The route of one vehicle, on which its place is tracked.
@@ -69,13 +83,22 @@ class RouteGuide:
     def __init__(self, scenario: Scenario, problem: PlanningProblem | None, start: VehicleState,
                  vehicle: VehicleParameters) -> None:
         self._scenario, self._problem, self._vehicle = scenario, problem, vehicle
-        self._replanned = False
-        self._plan(start)
+        self._first = self._route = self._planned(start)
+        self._s = self._search(start)
+
+    @property
+    def driving(self) -> DrivingPath:
+        """Return the present path, which is planned anew near its end if the road goes on."""
+        return self._route.driving
+
+    @property
+    def first(self) -> DrivingPath:
+        """Return the path with which every drive starts."""
+        return self._first.driving
 
     def restart(self, state: VehicleState) -> None:
-        """Start another drive on the same route."""
-        if self._replanned:
-            self._plan(state)
+        """Start another drive on the first route."""
+        self._route = self._first
         self._s = self._search(state)
 
     def follow(self, state: VehicleState) -> RoutePlace:
@@ -86,26 +109,24 @@ class RouteGuide:
             s, d, heading = path.locate(state.x, state.y, self._search(state))
         progress = s - before
         if math.isinf(self.driving.end_s) and s > path.length - RESERVE:
-            self._plan(state)
-            self._replanned = True
+            self._route = self._planned(state)
             path = self.driving.path
-            s, d, heading = path.locate(state.x, state.y, self._s)
+            s, d, heading = path.locate(state.x, state.y, self._search(state))
         self._s = s
-        row = min(max(round(s / path.step), 0), len(self._limits) - 1)
+        limits = self._route.limits
+        row = min(max(round(s / path.step), 0), len(limits) - 1)
         return RoutePlace(
-            s, d, wrap_pi(state.yaw - heading), path.curvature_at(s), self._limits[row],
-            min(max(self._goal_s - s, 0.0), FAR), progress)
+            s, d, wrap_pi(state.yaw - heading), path.curvature_at(s), limits[row],
+            min(max(self._route.goal_s - s, 0.0), FAR), progress)
 
-    def _plan(self, state: VehicleState) -> None:
+    def _planned(self, state: VehicleState) -> _Route:
         problem = self._problem
-        self.driving: DrivingPath = plan_driving_path(
+        driving = plan_driving_path(
             self._scenario, problem, state, self._vehicle, follow_lane=problem is None)
         usual = max(SLOWEST_DESIRED, abs(state.speed)) if problem is None \
             else default_speed(problem)
-        self._limits: list[float] = desired_speeds(self.driving, None, usual).tolist()
-        self._goal_s = _goal(self.driving, problem)
-        self._replanned = False
-        self._s = self._search(state)
+        return _Route(driving, desired_speeds(driving, None, usual).tolist(),
+                      _goal(driving, problem))
 
     def _search(self, state: VehicleState) -> float:
         s, _ = self.driving.path.project(np.array([[state.x, state.y]]))

@@ -3,17 +3,51 @@
 """The world around one driven vehicle, as input of its policy's observation."""
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 from crgame_ros.game.objects import ObjectDescription, ObjectStates
+from crgame_ros.geometry.outline import outline
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.plan import PlanRequest
+from crgame_ros.perception.sensors import SensedBodies
 from crgame_ros.vehicle.state import pose_rates, VehicleState
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+class Things:
+    """
+    The shapes of all objects that can appear around a vehicle in a run, for its observation.
+
+    :param descriptions: (N) of the objects.
+    :ivar sizes: (N, 2) length and width [m]
+    """
+
+    def __init__(self, descriptions: Sequence[ObjectDescription]) -> None:
+        self.descriptions = tuple(descriptions)
+        self.sizes: Array = np.array([
+            (item.shape.length, item.shape.width) for item in self.descriptions],
+            dtype=np.float64).reshape(-1, 2)
+
+    # Not every observation needs these.
+    @cached_property
+    def bodies(self) -> SensedBodies:
+        """Return the bodies that a lidar hits."""
+        return SensedBodies(self.descriptions)
+
+    @cached_property
+    def outlines(self) -> list[Array]:
+        """Return the corners of each, around its centre [m]."""
+        return [outline(item.shape) for item in self.descriptions]
+
+    @cached_property
+    def radii(self) -> Array:
+        """Return the radii (N) of their circles [m]."""
+        return np.array([item.shape.radius for item in self.descriptions])
 
 
 class Surrounded(NamedTuple):
@@ -23,11 +57,13 @@ class Surrounded(NamedTuple):
     :param state: of its rear axle.
     :param poses: (N, 3) centres of all objects; NaN where absent
     :param velocities: (N, 3)
+    :param things: (N) the shapes of the objects.
     """
 
     state: VehicleState
     poses: Array
     velocities: Array
+    things: Things
 
 
 class RequestView:
@@ -40,15 +76,15 @@ class RequestView:
 
     def __init__(self, vehicle_id: str, objects: Mapping[str, ObjectDescription]) -> None:
         # In the order of `Surrounded.poses`.
-        self.things = tuple(item for key, item in objects.items() if key != vehicle_id)
-        self._rows = {item.id: row for row, item in enumerate(self.things)}
+        self._things = Things([item for key, item in objects.items() if key != vehicle_id])
+        self._rows = {item.id: row for row, item in enumerate(self._things.descriptions)}
 
     def observe(self, request: PlanRequest) -> Surrounded:
         """Return the AV and the objects around it at the time of the request, no predictions."""
-        poses, velocities = np.full((2, len(self.things), 3), np.nan)
+        poses, velocities = np.full((2, len(self._rows), 3), np.nan)
         rows = [self._rows[name] for name in request.obstacle_ids]
         poses[rows], velocities[rows] = request.obstacle_poses[0], request.obstacle_velocities[0]
-        return Surrounded(request.ego, poses, velocities)
+        return Surrounded(request.ego, poses, velocities, self._things)
 
 
 class SeatView:
@@ -67,7 +103,7 @@ class SeatView:
         self._rows = np.array([i for i in range(len(driven)) if i != row], dtype=np.intp)
         self._to_center = np.array([driven[i].rear_to_center for i in self._rows])
         # In the order of `Surrounded.poses`.
-        self.things = (*(driven[i] for i in self._rows), *others)
+        self._things = Things((*(driven[i] for i in self._rows), *others))
 
     def own(self, states: Array) -> VehicleState:
         """Return the vehicle's own state of all states (V, 8) in simulation coordinates."""
@@ -94,7 +130,7 @@ class SeatView:
         if not self._transform.is_identity:
             poses, velocities = self._transform.to_scenario(poses), velocities.copy()
             velocities[:, :2] = self._transform.turn_to_scenario(velocities[:, :2])
-        return Surrounded(self.own(states), poses, velocities)
+        return Surrounded(self.own(states), poses, velocities, self._things)
 
     def in_simulation(self, poses: Array) -> Array:
         """Return poses (..., 3) in simulation coordinates from those in the road's."""

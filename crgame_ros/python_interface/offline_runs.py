@@ -201,7 +201,8 @@ def drive(name: str, setup: Setup, latency_steps: int = 0,
     """
     if latency_steps < 0:
         raise InputError(f'is {latency_steps}', 'latency', 'give 0 or more steps')
-    known = [item.name for item in (*setup.game.events, *setup.game.tasks)]
+    known = [*(event.name for event in setup.game.events),
+             *(task.name for task in setup.game.tasks)]
     for event, time_s in triggers:
         if event not in known:
             raise InputError(f'there is no event "{event[:40]}"', 'triggers',

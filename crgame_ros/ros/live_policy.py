@@ -91,12 +91,10 @@ class LivePolicyDriver(DriverSource):
                 if self._driver is not None:
                     self._driver.see(step.n, step.states, step.objects if step.tick else None)
                     self._latest_n, decided = step.n, decided or step.tick
-        except Exception as error:
-            # A user's code may raise anything; it must not keep the seat then.
-            text = str(error) if isinstance(error, CrgameError) else f'{type(error).__name__}: ' \
-                f'{error}'
-            self.problem = InputError(f'the policy has failed ({text})', self._vehicle_id,
-                                      'mend it and reset the run')
+                    self.problem = self._driver.problem
+        except CrgameError as error:
+            self.problem = InputError(f'cannot follow the run ({error})', self._vehicle_id,
+                                      'reset the run')
         return decided
 
     def command(self, n: int, dt_s: float) -> DriverCommand:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import math
 import warnings
 
+from crgame_ros.errors import InputError
 from crgame_ros.search.settings import SearchSettings
 from crgame_ros.search.trials import Outcome, Trials
 from crgame_ros.variation.space import Variant, VariantSpace
@@ -141,9 +142,13 @@ def pool_of(space: VariantSpace, number: int, seed: int) -> list[dict[str, objec
 
     :param number: of points drawn, a power of two; those that break a constraint are left out.
     :param seed: of a scrambled Sobol sequence.
+    :raises InputError: if all of them do.
     """
     points = qmc.Sobol(len(space.axes), rng=seed).random(number)
-    return [variant for variant in map(space.variant, points) if space.is_allowed(variant)]
+    pool = [variant for variant in map(space.variant, points) if space.is_allowed(variant)]
+    if not pool:
+        raise InputError(f'none of {number} points keeps the constraints', 'vary', 'loosen them')
+    return pool
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 """The command `crgame search`: the variants of a game in which a planner does worst."""
 
 import argparse
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import get_args, TYPE_CHECKING
@@ -33,6 +34,10 @@ which you can drive yourself: ./run.sh searches/game/found/1/live.yaml
 docs/search.md tells more."""
 _DEFAULT_GOAL = 'ttc'
 SEARCHES = Path('searches')
+# What a search is, which a folder of one states already.
+_DEFAULTS: dict[str, object] = {
+    'minimise': [], 'maximise': [], 'planner': None, 'option': [], 'budget': 500, 'seed': 0,
+    'sampler': 'tpe', 'batch': 4, 'explore_only': False, 'unavoidable': False, 'out': None}
 INSTALL = extra_install('search')
 
 
@@ -43,25 +48,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add('game', metavar='GAME|RUN|FOLDER', help='a game file with `vary:`, the name of a game of '
         'this package, a recorded run, or the folder of a search')
-    add('--minimise', action='append', default=[], metavar='MEASURE',
-        help=f'a measure that is bad when small (default: {_DEFAULT_GOAL}); may be repeated')
-    add('--maximise', action='append', default=[], metavar='MEASURE',
-        help='a measure that is bad when large; may be repeated')
-    add('--planner', metavar='NAME', help="planner of all AVs (default: the game's own)")
-    add('--option', action='append', default=[], metavar='KEY=VALUE',
-        help='an option of this planner; may be repeated')
-    add('--budget', type=int, default=500, metavar='N', help='runs (default: %(default)d)')
-    add('--seed', type=int, default=0, metavar='N', help='of the search (default: 0)')
-    add('--sampler', choices=get_args(Sampler), default='tpe',
-        help='of Optuna, that explores (default: tpe; nsga2 for several measures)')
-    add('--batch', type=int, default=4, metavar='N', help='variants that are chosen together, as '
-        'many as there are workers or more (default: %(default)d)')
-    add('--explore-only', action='store_true', help='only explore, with all runs')
-    add('--unavoidable', action='store_true',
-        help='count contacts that no AV could avoid as failures, too')
+    # Without defaults, so that what is given beside the folder of a search can be refused.
+    setting = partial(add, default=argparse.SUPPRESS)
+    setting('--minimise', action='append', metavar='MEASURE', help='a measure that is bad when '
+            f'small (default: {_DEFAULT_GOAL}); may be repeated')
+    setting('--maximise', action='append', metavar='MEASURE',
+            help='a measure that is bad when large; may be repeated')
+    setting('--planner', metavar='NAME', help="planner of all AVs (default: the game's own)")
+    setting('--option', action='append', metavar='KEY=VALUE',
+            help='an option of this planner; may be repeated')
+    setting('--budget', type=int, metavar='N', help=f'runs (default: {_DEFAULTS["budget"]})')
+    setting('--seed', type=int, metavar='N',
+            help=f'of the search (default: {_DEFAULTS["seed"]})')
+    setting('--sampler', choices=get_args(Sampler), help='of Optuna, that explores '
+            f'(default: {_DEFAULTS["sampler"]}; nsga2 for several measures)')
+    setting('--batch', type=int, metavar='N', help='variants that are chosen together, as many '
+            f'as there are workers or more (default: {_DEFAULTS["batch"]})')
+    setting('--explore-only', action='store_true', help='only explore, with all runs')
+    setting('--unavoidable', action='store_true',
+            help='count contacts that no AV could avoid as failures, too')
     add('--keep', type=int, default=5, metavar='N',
         help='worst runs to write into found/ (default: %(default)d)')
-    add('--out', type=Path, metavar='DIR', help='folder (default: searches/<name of the game>)')
+    setting('--out', type=Path, metavar='DIR',
+            help='folder (default: searches/<name of the game>)')
     add('--workers', type=int, metavar='N', help='processes (default: one for each processor)')
     add('--scheduler', metavar='ADDRESS', help='a Dask scheduler whose workers compute instead')
     parser.set_defaults(command=run)
@@ -81,9 +90,14 @@ def run(values: argparse.Namespace) -> int:
     from crgame_ros.search.text import lines, results_text
     from crgame_ros.whole_file import write_text
     given = Path(values.game)
+    _check_within('keep', values.keep, 0, 1000)
     if (given / SEARCH_FILE).exists():
         folder = given
+        for name in _DEFAULTS.keys() & vars(values).keys():
+            raise InputError('is of a new search, not of one that goes on',
+                             f'--{name.replace("_", "-")}', f'leave it out beside {given}')
     else:
+        values = argparse.Namespace(**_DEFAULTS | vars(values))
         settings = _settings(values, _game(given, values))
         folder = values.out or SEARCHES / Path(settings.game).stem
         begin(settings, folder)
@@ -129,11 +143,9 @@ def _require() -> None:
 def _settings(values: argparse.Namespace, game: Path) -> SearchSettings:
     from crgame_ros.launcher.arguments import read_options
     from crgame_ros.schema.marks import named_file
-    for name, value, least, most in (
-            ('budget', values.budget, 1, 10_000_000), ('batch', values.batch, 1, 10_000),
-            ('seed', values.seed, 0, 2**32 - 1), ('keep', values.keep, 0, 1000)):
-        if not least <= value <= most:
-            raise InputError(f'is {value}', f'--{name}', f'give {least} to {most}')
+    _check_within('budget', values.budget, 1, 10_000_000)
+    _check_within('batch', values.batch, 1, 10_000)
+    _check_within('seed', values.seed, 0, 2**32 - 1)
     if values.option and not values.planner:
         raise InputError('is for a planner', '--option', 'name it with --planner')
     goals = (*(Goal(name, 1) for name in values.minimise),
@@ -145,6 +157,11 @@ def _settings(values: argparse.Namespace, game: Path) -> SearchSettings:
         named_file(values.planner, Path.cwd()) if values.planner else '',
         dict(read_options(values.option)), values.budget, values.batch, values.seed,
         values.sampler, values.explore_only, values.unavoidable)
+
+
+def _check_within(name: str, value: int, least: int, most: int) -> None:
+    if not least <= value <= most:
+        raise InputError(f'is {value}', f'--{name}', f'give {least} to {most}')
 
 
 def _computing(values: argparse.Namespace) -> 'Computing':

@@ -12,7 +12,7 @@ import math
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.object_spec import MAX_ROWS, ObjectSpec, TrajectoryRow
+from crgame_ros.game.object_spec import BICYCLE_TYPES, MAX_ROWS, ObjectSpec, TrajectoryRow
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.variation_spec import Dimension
 from crgame_ros.recording.metadata import METADATA_FILE
@@ -39,7 +39,8 @@ def game_of_run(run: Path, folder: Path, other_planners: bool) -> Path:
     :param folder: of the files: `NAME.yaml` and `NAME.xml`.
     :param other_planners: whether the user names the planner.
     :return: the game file.
-    :raises InputError: if the recording cannot be used, or has no human or no AV.
+    :raises InputError: if the recording cannot be used, or has no human or no AV; or if the game
+        file has been edited.
     """
     bag = recording_in(run)
     recorded = read_recorded_game(bag, other_planners=other_planners)
@@ -55,7 +56,9 @@ def game_of_run(run: Path, folder: Path, other_planners: bool) -> Path:
         step_s = recorded.loaded.scenario.dt
         name = f'recorded_{vehicle.id}'
         objects.append(ObjectSpec(
-            name, 'bicycle', type='car', end='stay',
+            # What has no type of its kind, such as a priority vehicle, moves as a car.
+            name, 'bicycle', type=vehicle.type if vehicle.type in BICYCLE_TYPES else 'car',
+            end='stay',
             size=(vehicle.shape.length, vehicle.shape.width),
             trajectory=_rows(states, vehicle, step_s)))
         vary += [
@@ -65,15 +68,18 @@ def game_of_run(run: Path, folder: Path, other_planners: bool) -> Path:
                       _fastest(states, step_s), distribution='normal', mean=1.0,
                       deviation=SPEED_DEVIATION, nominal=1.0)]
     name = folder_name(run)
-    write_text(log.xml_text, folder / f'{name}.xml')
     game = recorded.game
     game = replace(
         game, scenario=folder / f'{name}.xml', humans=(), objects=(*game.objects, *objects),
         vary=tuple(vary), expect=game.expect, duration=min(
             game.duration, (len(log.ks) - 1) * recorded.loaded.scenario.dt),
         drivability=replace(game.drivability, stop=False))
-    path = folder / f'{name}.yaml'
-    write_text(game.dump(), path)
+    path, text = folder / f'{name}.yaml', game.dump()
+    if path.exists() and path.read_text(encoding='utf-8') != text:
+        raise InputError('is another game than that of the run', str(path),
+                         'search this file, or remove it')
+    write_text(log.xml_text, folder / f'{name}.xml')
+    write_text(text, path)
     return path
 
 

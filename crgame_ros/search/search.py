@@ -17,7 +17,7 @@ from crgame_ros.evaluation.evaluation import BATCH_S, Computing
 from crgame_ros.evaluation.file_names import GRID_FILE, SEARCH_FILE
 from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.evaluation.judging import check_expectations, expectations_of, known_measure
-from crgame_ros.evaluation.plan import EvaluationPlan, parse_plan, PlannerChoice
+from crgame_ros.evaluation.plan import EvaluationPlan, PlannerChoice
 from crgame_ros.evaluation.results.parts import ResultParts
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.game import load_game
@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 
 # Points asked for until one keeps the constraints.
 _ASKED = 100
+# Batches in a row of which all variants were run before, until exploration ends.
+_KNOWN = 20
 # Variants that are chosen by chance before there is something to learn from.
 _STARTUP = 8
 # Candidates among which TPE takes the best; its default of 24 needs half as many runs again.
@@ -131,7 +133,6 @@ def run_search(folder: Path, computing: Computing, began: Began, told: Told) -> 
     """
     settings = SearchSettings.read(folder)
     place = EvaluationFolder(folder)
-    plan = parse_plan(place.plan_values(), str(folder), place.base)
     grid = _without_variants(place.grid())
     values = grid.scenes[0].values
     space = space_of(values, settings.game)
@@ -140,7 +141,7 @@ def run_search(folder: Path, computing: Computing, began: Began, told: Told) -> 
     with ResultParts(folder, computing.part_cells) as parts, \
             dask_client(computing.scheduler, computing.workers, computing.dashboard) as client:
         check_workers(client)
-        trials = Trials(settings, expectations, place, plan, grid, parts, client, limits, told)
+        trials = Trials(settings, expectations, place, grid, parts, client, limits, told)
         phases = []
         smallest, probability = None, None
         parts_of_budget: tuple[tuple[str, float], ...] = (
@@ -225,14 +226,16 @@ class _Exploration:
     def run(self, runs: int) -> None:
         end = len(self._trials.outcomes) + runs
         self._enqueue_nominal()
+        known = 0
         while (count := min(self._settings.batch, end - len(self._trials.outcomes))) > 0:
             before = len(self._trials.outcomes)
             asked = [self._ask() for _ in range(count)]
             outcomes = self._trials.run(variant for _, variant in asked)
             for (trial, _), outcome in zip(asked, outcomes, strict=False):
                 self._tell(trial, outcome)
-            if len(self._trials.outcomes) == before:
-                # All of them were run before: the sampler has nothing new, as in a small space.
+            known = known + 1 if len(self._trials.outcomes) == before else 0
+            if known == _KNOWN:
+                # The sampler has nothing new, as in a small space.
                 break
 
     def _enqueue_nominal(self) -> None:
@@ -250,9 +253,10 @@ class _Exploration:
                 (trial.params[axis.name] + 0.5) / len(axis.spec.values) if axis.spec.values
                 else trial.params[axis.name] for axis in self._space.axes])
             if self._space.is_allowed(variant):
-                break
+                return trial, variant
             self._study.tell(trial, state=self._failed)
-        return trial, variant
+        raise InputError(f'none of {_ASKED} points keeps the constraints', self._settings.game,
+                         'loosen them')
 
     def _tell(self, trial: 'Trial', outcome: Outcome) -> None:
         if not outcome.is_known:
@@ -274,10 +278,11 @@ def shrink(space: VariantSpace, trials: Trials, settings: SearchSettings,
 
     :param runs: number of runs.
     :return: the nearest failure that is known; None without failures, or where the game as it is
-        fails.
+        fails: then it takes no change.
     """
     end = len(trials.outcomes) + runs
-    if not trials.failures:
+    if not trials.failures \
+            or not space.distance(_nearest(space, trials)[0].variant, space.nominal):
         return None
     for start in _nearest(space, trials)[:_STARTS]:
         best = _put_back(space, trials, start, end)
@@ -321,8 +326,8 @@ def _along_line(space: VariantSpace, trials: Trials, best: Outcome, end: int) ->
     names = [axis.is_numeric for axis in space.axes]
     while len(trials.outcomes) < end and np.max(np.abs(failing - passing)) > 1e-3:
         shares = [(index + 1) / (_BETWEEN + 1) for index in range(_BETWEEN)]
-        points = [np.where(names, failing + share * (passing - failing), failing)
-                  for share in shares]
+        points = [point for share in shares if space.is_allowed(space.variant(
+            point := np.where(names, failing + share * (passing - failing), failing)))]
         tried = _run(space, trials, [space.variant(point) for point in points], end)
         before = (failing, passing)
         for point, outcome in zip(points, tried, strict=False):

@@ -13,7 +13,6 @@ from crgame_ros.evaluation.cell_scene import variant_text
 from crgame_ros.evaluation.evaluation import rows_of
 from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.evaluation.judging import shortfalls, worst_of
-from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.results.cell_rows import CellRows
 from crgame_ros.evaluation.results.parts import ResultParts, stored_rows
 from crgame_ros.evaluation.source_digest import engine_digest
@@ -71,7 +70,6 @@ class Trials:
     :param settings: of the search.
     :param expectations: what a run has to keep.
     :param place: folder of the evaluation.
-    :param plan: plan of the evaluation.
     :param grid: grid of one scene without variants.
     :param parts: tables for the rows.
     :param client: a `distributed.Client`.
@@ -80,11 +78,10 @@ class Trials:
     """
 
     def __init__(self, settings: SearchSettings, expectations: Sequence[Expectation],
-                 place: EvaluationFolder, plan: EvaluationPlan, grid: CellGrid,
-                 parts: ResultParts, client: Client, limits: Limits,
-                 told: Callable[[Outcome, bool], object]) -> None:
+                 place: EvaluationFolder, grid: CellGrid, parts: ResultParts, client: Client,
+                 limits: Limits, told: Callable[[Outcome, bool], object]) -> None:
         self._settings, self._expectations = settings, expectations
-        self._place, self._plan, self._parts = place, plan, parts
+        self._place, self._parts = place, parts
         self._grid = grid
         self._client, self._limits, self._told = client, limits, told
         self.outcomes: list[Outcome] = []
@@ -136,16 +133,15 @@ class Trials:
         scene = self._grid.scenes[0]
         cells = {cell.key: cell for cell in replace(self._grid, scenes=(
             replace(scene, variants=tuple(new.values())),))}
-        missing = [cell for key, cell in cells.items() if key not in self._earlier]
         known = cells.keys() & self._earlier.keys()
-        self._grid = replace(self._grid, scenes=(
-            replace(scene, variants=(*scene.variants, *new.values())),))
+        missing = [cell for key, cell in cells.items() if key not in known]
         if missing and self._grid.engine != engine_digest():
             raise InputError('another version of crgame_ros began it', str(self._place.path),
                              'search again in another folder: --out')
         if missing:
-            # Before their rows: a cell is found by the variants in the grid.
-            self._place.write_grid(self._plan, self._grid)
+            # Before their rows: a cell is found by the variants in the folder.
+            self._place.add_variants(variant for key, variant in zip(
+                cells, new.values(), strict=True) if key not in known)
             batches = CellBatches(self._client, self._place.store, self._limits, iter(missing),
                                   len(missing))
             for ended in batches.results():

@@ -237,7 +237,7 @@ def run_offline(
         the first tick from n on.
     :param observers: receive every state that a live run publishes.
     :param traces: (N, 8) states by human, from step 0 on, that replace driving.
-    :param say: called with each text about a planner that fails.
+    :param say: called with each text about a planner or a policy that fails.
     :param progress: called with the share of the run that is done, 0 to 1, at each step.
     :param keep_messages: keep `OfflineResult.messages`, which a recording of the run needs.
     :raises InputError: if a human's driver needs a person or a device, or a trigger is refused.
@@ -247,6 +247,7 @@ def run_offline(
     drivers = drivers or {}
     hands = [drivers.get(human.id) or offline_driver(setup, index)
              for index, human in enumerate(setup.humans)]
+    well = list(hands)
     takers = [drivers.get(av.id) for av in setup.avs]
     log = MessageLog(simulation) if keep_messages else None
     seats = [PlannerSeat(setup, index, simulation, latency_steps, clock_s, say, log)
@@ -270,6 +271,9 @@ def run_offline(
             break
         n = simulation.n
         show(simulation, result, hands)
+        for hand in [each for each in well if each.problem is not None]:
+            say(str(hand.problem))
+            well.remove(hand)
         commands = [
             *(hand.command(n, dt_s) for hand in hands),
             *(taker.command(n, dt_s) if taker is not None and taker.drives(n) else None

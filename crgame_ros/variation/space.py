@@ -181,7 +181,8 @@ class VariantSpace:
             raise InputError('nothing varies', where, 'add an entry with a name and a range to '
                              f'`{VARY}:` (docs/search.md)')
         self.values = {key: value for key, value in values.items() if key not in (VARY, EXPECT)}
-        self.nominal: dict[str, object] = {axis.name: self._nominal(axis) for axis in self.axes}
+        self.nominal: dict[str, object] = {
+            axis.name: self._nominal(axis, where) for axis in self.axes}
         # Unknown names and keys are refused here, not in the middle of an evaluation.
         self.is_allowed(self.nominal)
         self.game_values(self.nominal)
@@ -191,11 +192,17 @@ class VariantSpace:
         """Return the names of its dimensions."""
         return [axis.name for axis in self.axes]
 
-    def _nominal(self, axis: Axis) -> object:
-        if axis.spec.nominal is not None:
-            return axis.spec.nominal
-        given = None if axis.spec.key is None else _value_at(self.values, axis.spec.key)
-        return axis.value(0.5) if given is None else given
+    def _nominal(self, axis: Axis, where: str) -> object:
+        spec = axis.spec
+        given = spec.nominal
+        if given is None and spec.key is not None:
+            given = _value_at(self.values, spec.key)
+        if given is None:
+            return axis.value(0.5)
+        if spec.distribution == 'lognormal' and isinstance(given, int | float) and given <= 0:
+            raise InputError(f'"{spec.name}" is {given} in the game as it is', f'{where}: {VARY}',
+                             'give a `nominal` above 0, or another distribution than lognormal')
+        return given
 
     def variant(self, point: Sequence[float] | Point) -> dict[str, object]:
         """Return the variant at a point (D) of the unit cube."""

@@ -101,6 +101,16 @@ def _prepared(source: Path, kind: WorldKind, folder: Path, timeout_s: float,
               say: Callable[[str], object],
               ) -> tuple[etree._Element, list[LightCycle | None] | None, list[str]]:
     """Return the map as the converter reads it, the cycles of its lights, and remarks."""
+    try:
+        return _made_ready(source, kind, folder, timeout_s, say)
+    except ValueError as error:
+        raise InputError(f'has a value that is no number ({error})', str(source),
+                         'look at the map in an editor of its format') from error
+
+
+def _made_ready(source: Path, kind: WorldKind, folder: Path, timeout_s: float,
+                say: Callable[[str], object],
+                ) -> tuple[etree._Element, list[LightCycle | None] | None, list[str]]:
     if kind is LANELET2:
         root = _parsed(source, 'osm')
         return root, None, prepare_lanelet2(root, str(source))

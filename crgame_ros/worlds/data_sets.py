@@ -140,10 +140,11 @@ def _finish(path: Path, recording: Recording, window: int,
         f'{what}, up to frame {last}, by {DATA_SET_CONVERTER.title} and crgame import')
     if made is None:
         return None
-    out = order.out / f'{made.benchmark_id}.xml'
+    benchmark_id, xml_text = made
+    out = order.out / f'{benchmark_id}.xml'
     if out.exists() and not order.force:
         raise InputError('is there already', str(out), 'add --force to replace it')
-    write_text(made.xml_text, out)
+    write_text(xml_text, out)
     return out
 
 
@@ -210,22 +211,8 @@ def _made(process: 'subprocess.Popen[str]', made: Path, log: Path, recording: Re
         raise InputError(one_line(said)[-_LAST_WORDS:], what)
 
 
-@dataclass(frozen=True)
-class RecordedScenario:
-    """
-    A scenario of recorded traffic.
-
-    :param benchmark_id: its benchmark id.
-    :param xml_text: the content of the file; it is valid by CommonRoad's schema but for vehicles
-        that appear after time step 0.
-    """
-
-    benchmark_id: str
-    xml_text: str
-
-
 def _recorded_scenario(loaded: LoadedScenario, number: int,
-                       source: str) -> RecordedScenario | None:
+                       source: str) -> tuple[str, str] | None:
     """
     Return a scenario in which an AV takes the place of a recorded car.
 
@@ -235,7 +222,9 @@ def _recorded_scenario(loaded: LoadedScenario, number: int,
     :param loaded: what the converter wrote, with obstacles from time step 0 on.
     :param number: of the scenario among those of its data set, from 1 on.
     :param source: what it is of, for its header.
-    :return: None if there is no such car, or the scenario is shorter than 10 time steps.
+    :return: benchmark id and content of the file, which is valid by CommonRoad's schema but for
+        vehicles that appear after time step 0; None if there is no such car, or the scenario is
+        shorter than 10 time steps.
     """
     network = RoadNetwork(loaded.scenario.lanelet_network)
     recorded = ScenarioObstacles(loaded)
@@ -261,8 +250,8 @@ def _recorded_scenario(loaded: LoadedScenario, number: int,
     header = scenario_header(benchmark_id, loaded.time_step_s, one_line(source),
                              author=root.get('author', ''),
                              affiliation=root.get('affiliation', ''))
-    return RecordedScenario(benchmark_id, scenario_document(
-        header, roads.elements, ''.join(written) + problem, late=True))
+    return benchmark_id, scenario_document(
+        header, roads.elements, ''.join(written) + problem, late=True)
 
 
 def _find_ego(network: RoadNetwork, recorded: ScenarioObstacles) -> tuple[int, int] | None:

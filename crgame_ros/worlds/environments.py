@@ -76,7 +76,8 @@ class Converter:
             for words in (['venv', '--python', '3.11', str(folder)],
                           ['pip', 'install', '--no-deps', '--python', python,
                            '--requirements', str(pins)]):
-                _run_quietly([uv, '--quiet', *words], f'{self.title} cannot be installed', _MAKE_S)
+                _run_quietly([uv, '--quiet', *words], f'{self.title} cannot be installed', _MAKE_S,
+                             'try again with a faster connection')
             (folder / _STAMP).touch()
 
 
@@ -113,8 +114,10 @@ def run_converter(words: Sequence[str], folder: Path, what: str, timeout_s: floa
     :return: what it printed.
     :raises InputError: if it fails or takes too long; its last line says why.
     """
-    return _run_quietly(words, what, timeout_s, folder, converter_variables() | {
-        'QT_QPA_PLATFORM': 'offscreen', 'MPLBACKEND': 'Agg', 'NO_COLOR': '1'})
+    return _run_quietly(
+        words, what, timeout_s, 'give a smaller map, or more time with --timeout', folder,
+        converter_variables() | {
+            'QT_QPA_PLATFORM': 'offscreen', 'MPLBACKEND': 'Agg', 'NO_COLOR': '1'})
 
 
 def converter_variables() -> dict[str, str]:
@@ -123,15 +126,14 @@ def converter_variables() -> dict[str, str]:
             if name not in ('PYTHONPATH', 'PYTHONHOME', 'VIRTUAL_ENV')}
 
 
-def _run_quietly(words: Sequence[str], what: str, timeout_s: float, folder: Path | None = None,
-                 environment: dict[str, str] | None = None) -> str:
+def _run_quietly(words: Sequence[str], what: str, timeout_s: float, remedy: str,
+                 folder: Path | None = None, environment: dict[str, str] | None = None) -> str:
     try:
         done = subprocess.run(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                               stderr=subprocess.STDOUT, timeout=timeout_s, cwd=folder,
                               env=environment, check=False)
     except subprocess.TimeoutExpired as error:
-        raise InputError(f'took longer than {timeout_s:.0f} s', what,
-                         'give a smaller map, or more time with --timeout') from error
+        raise InputError(f'took longer than {timeout_s:.0f} s', what, remedy) from error
     except OSError as error:
         raise CrgameError(f'{what}: {words[0]} cannot be run ({error.strerror})') from error
     text = done.stdout.decode(errors='replace')

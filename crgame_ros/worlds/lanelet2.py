@@ -69,8 +69,8 @@ def _place_nodes(root: etree._Element, source: str) -> tuple[dict[str, FloatArra
         node.set('lon', f'{longitude:.13f}')
     # The converter fails where some nodes have a height, and others 0 or none.
     heights = [_tag(node, 'ele') for node in nodes]
-    if any(height is None or not _LIMIT.match(height.lstrip('-')) or float(height) == 0.0
-           for height in heights):
+    values = _numbers([(height, '0') for height in heights])[:, 0]
+    if not (np.isfinite(values) & (values != 0.0)).all():
         for node in nodes:
             for height in node.findall('tag[@k="ele"]'):
                 node.remove(height)

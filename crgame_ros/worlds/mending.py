@@ -274,12 +274,15 @@ def _cut_turning(root: etree._Element, lanelets: dict[str, Bounds], remarks: lis
             bounds.element.addprevious(part.element)
             lanelets[part.element.get('id')] = part
         root.remove(bounds.element)
-    # Whatever begins at the end of a lanelet in parts begins at the end of its last part.
+    # Whatever begins at the end of a lanelet in parts begins at the end of its last part, and
+    # junctions too.
     for lanelet in root.iterchildren('lanelet'):
         for link in lanelet.findall('predecessor'):
             chain = numbers.get(link.get('ref'))
             if chain is not None and lanelet.get('id') not in chain[1:]:
                 link.set('ref', chain[-1])
+    for incoming in root.iterfind('intersection/incoming/incomingLanelet'):
+        incoming.set('ref', numbers.get(incoming.get('ref'), [incoming.get('ref')])[-1])
     remarks.append(f'{len(parts)} lanelets that meet themselves are cut into '
                    f'{sum(parts.values())} parts')
 
@@ -310,7 +313,8 @@ def _link_part(element: etree._Element, at: int, numbers: dict[str, list[str]]) 
             same = link.get('drivingDir') == 'same'
             link.set('ref', beside[at if same else len(beside) - 1 - at])
     if at < len(chain) - 1:
-        for line in element.findall('stopLine'):
+        # A light holds vehicles at the end of a lanelet, with or without a line.
+        for line in element.findall('stopLine') + element.findall('trafficLightRef'):
             element.remove(line)
 
 

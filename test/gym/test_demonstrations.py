@@ -5,11 +5,12 @@
 from dataclasses import replace
 from pathlib import Path
 
+from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import load_game
 from crgame_ros.gym.demonstrations import demonstration, TOLERANCE, write_demonstrations
 from crgame_ros.recording.offline_recording import write_recording
-from crgame_ros.simulation.offline import OfflineResult, run_offline
+from crgame_ros.simulation.offline import observed_run, OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
@@ -60,6 +61,37 @@ def test_a_demonstration_ends_as_an_episode_does(run: tuple[OfflineResult, Path]
         demonstration(run[1], 'hv7')
     with pytest.raises(InputError, match='unknown'):
         demonstration(run[1], observation={'part': []})
+
+
+def test_a_demonstration_measures_criticality_to_those_that_were_recorded(
+        tmp_path: Path) -> None:
+    game = load_game(SCENARIOS / 'dense_merge.yaml')
+    assert game.traffic is not None
+    game = replace(game, seed=3, traffic=replace(game.traffic, seed=11))
+    assert game.humans
+    setup = build_setup(game)
+    criticality = Criticality(observed_run(setup))
+    limits = {'thw': 2.0, 'ttc_2d': 3.0, 'min_distance': 2.0}
+    shortages: list[float] = []
+
+    class Measured:
+        """Keeps the shortages of the human at each state."""
+
+        def observe(self, *given: object) -> None:
+            criticality.observe(*given)  # type: ignore[arg-type]
+            worst = criticality.latest[0].worst()[0]
+            shortages.append(sum(max(0.0, 1.0 - worst[COLUMN[name]] / limit)
+                                 for name, limit in limits.items()
+                                 if worst[COLUMN[name]] == worst[COLUMN[name]]))
+
+        def report(self) -> None:
+            """Return nothing."""
+
+    result = run_offline(setup, duration_s=8.0, keep_messages=True, observers=[Measured()])
+    write_recording(result, tmp_path / 'run')
+    made = demonstration(tmp_path / 'run', reward=dict.fromkeys(limits, 1.0), ends=())
+    assert max(shortages) > 0.1
+    assert made.rewards == pytest.approx(shortages[10::10], abs=1e-6)
 
 
 def test_a_run_that_cannot_be_replayed_is_refused(tmp_path: Path) -> None:

@@ -2,18 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """Episodes: they equal runs of the same game."""
 
+from copy import deepcopy
 from dataclasses import replace
+import math
 from pathlib import Path
 
+from commonroad.common.util import Interval
+from commonroad.planning.goal import GoalRegion
+from commonroad.scenario.state import CustomState
+from crgame_ros.analysis.criticality.criticality import COLUMN, MEASURES, TickMeasures
 from crgame_ros.drivability.monitor import DrivabilityMonitor
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.game import LaneletSpawn, load_game
 from crgame_ros.gym.driving_env import DrivingEnv
 from crgame_ros.gym.driving_game import DrivingGame
 from crgame_ros.gym.episode_setups import EpisodeSetups, StartVariation
+from crgame_ros.gym.games_together import GamesTogether
+from crgame_ros.gym.reward import Decision, Reward
+from crgame_ros.policy.route_guide import RoutePlace
 from crgame_ros.simulation.observer import drivability_monitor
 from crgame_ros.simulation.offline import observed_run, OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from policies import change_lanes, follow_lane, HERE, LANES
 import pytest
@@ -44,6 +54,36 @@ def test_equal_seeds_give_equal_episodes_and_others_do_not(game: str) -> None:
     assert episode(env, 8, 15) != first
     assert episode(env, 7, 15) == first
     assert episode(DrivingEnv(game=game, vary={'speed': 2.0}), 7, 15) == first
+
+
+def test_vehicles_of_an_episode_are_those_of_its_seed_whatever_was_driven_before() -> None:
+    keywords = {'game': 'dense_merge', 'duration': 1.0, 'reward': {'ttc': -1.0, 'drac': -0.1},
+                'observation': {'parts': ['objects', 'lidar'], 'objects': 40}}
+    used, fresh, two = (DrivingEnv(**keywords), DrivingEnv(**keywords),
+                        GamesTogether(2, **keywords))
+    episode_of_others = used.reset(seed=1)
+    together = two.reset(seed=[1, 2])
+    for part, values in episode_of_others[0].items():
+        assert (together[0][part][0] == values).all()
+    first, second = used.reset(seed=2), fresh.reset(seed=2)
+    setup = used.agent.game.setup
+    # Seed 2 has its trucks in other slots than the game as it is.
+    assert setup.descriptions != used.agent.setups.base.descriptions
+    others = [item for item in setup.descriptions if item.id != 'av0']
+    still = np.zeros(2, np.float32)
+    for _ in range(5):
+        for part, values in first[0].items():
+            assert (values == second[0][part]).all()
+            assert (values == together[0][part][1]).all()
+        rows = first[0]['objects']
+        near = rows[rows[:, 0] > 0.5]
+        around = used.agent.seats[0].around
+        nearest = np.argsort(np.hypot(*(around.poses[:, :2] - around.state[:2]).T))[:len(near)]
+        assert near[:, 6] == pytest.approx([others[index].shape.length for index in nearest])
+        first, second = used.step(still), fresh.step(still)
+        assert first[1:] == second[1:]
+        together = two.step(np.zeros((2, 2), np.float32))
+        assert together[1][1] == first[1]
 
 
 @pytest.mark.exhaustive
@@ -106,7 +146,7 @@ def test_manoeuvres_of_a_policy_are_the_same_in_a_run_as_in_the_environment() ->
     ('dense_merge', 'av0')])
 def test_contacts_and_the_road_are_judged_as_the_monitor_does(game: str, seat: str) -> None:
     setups = EpisodeSetups(load_game(SCENARIOS / f'{game}.yaml'), StartVariation(), 1)
-    drive = DrivingGame(setups, (seat,), 'acceleration', 1)
+    drive = DrivingGame(setups.base, (seat,), 'acceleration', 1)
     monitors: list[DrivabilityMonitor] = []
 
     class Recorder:
@@ -130,7 +170,7 @@ def test_contacts_and_the_road_are_judged_as_the_monitor_does(game: str, seat: s
 
     found = 0
     for seed, action in enumerate(((1.0, 0.3), (1.0, -0.3), (0.5, 0.0), (1.0, 0.05))):
-        drive.begin(seed)
+        drive.begin(setups.make(seed, {}))
         monitors[:] = [drivability_monitor(observed_run(drive.setup))]
         monitors[0].set_objects(drive.objects)
         for _ in range(25):
@@ -202,6 +242,34 @@ def test_the_goal_of_the_planning_problem_ends_an_episode() -> None:
     state = env.agent.seats[0].state
     assert position.contains_point(np.array(state.center(1.4227)))
     assert not position.contains_point(np.array(env.agent.seats[0].before[0].center(1.4227)))
+
+
+def test_a_goal_that_holds_between_two_decisions_is_reached() -> None:
+    game = load_game(SCENARIOS / 't_junction.yaml')
+    setups = EpisodeSetups(game, StartVariation())
+    av = setups.base.avs[0]
+    problem = deepcopy(av.planning_problem)
+    # Anywhere, at the steps 30 and 31, which are no multiples of 4.
+    problem.goal = GoalRegion([CustomState(time_step=Interval(30, 31))])
+    setup = replace(setups.base, avs=(replace(av, planning_problem=problem),))
+    drive = DrivingGame(setup, ('av0',), 'acceleration', 4)
+    drive.begin(setup)
+    reached = []
+    for _ in range(9):
+        drive.act({'av0': np.zeros(2)})
+        reached.append(drive.seats[0].goal)
+    assert reached == [False] * 7 + [True, False]
+
+
+def test_at_a_contact_braking_terms_are_their_bounds() -> None:
+    worst = np.full((1, len(MEASURES)), np.nan)
+    worst[0, [COLUMN['drac'], COLUMN['a_req']]] = math.inf, -math.inf
+    measures = TickMeasures(0, np.array([1]), worst, None)
+    state = VehicleState(0.0, 0.0, 0.0, 10.0)
+    place = RoutePlace(0.0, 0.0, 0.0, 0.0, 10.0, 1000.0, 0.0)
+    reward, terms = Reward({'drac': 0.0, 'a_req': -1.0}).compute(
+        Decision(0.1, state, state, place, True, False, False, measures))
+    assert (reward, terms) == (-20.0, {'drac': 20.0, 'a_req': 20.0})
 
 
 def test_rewards_are_what_the_states_say() -> None:

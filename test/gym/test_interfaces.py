@@ -82,7 +82,9 @@ def test_gymnasium_accepts_plans_and_perception() -> None:
     ({'game': 'cut_in', 'observation': {'part': []}}, 'unknown'),
     ({'game': 'cut_in', 'vary': {'speed': -1.0}}, 'speed'),
     ({'game': 'cut_in', 'duration': 0.0}, 'positive'), ({'game': 'cut_in', 'ticks': 0}, 'ticks'),
-    ({'game': 'cut_in', 'worlds': 0}, 'worlds'),
+    ({'game': 'cut_in', 'worlds': 0}, 'worlds'), ({'game': 'cut_in', 'worlds': 2.5}, 'worlds'),
+    ({'game': 'cut_in', 'ticks': 2.5}, 'ticks'),
+    ({'game': 'cut_in', 'observation': ['state']}, 'is no mapping'),
     ({'game': 'cut_in', 'drivers': {'hv7': 'idle'}}, 'hv7'),
     ({'game': 'cut_in', 'render_mode': 'ansi'}, 'rgb_array')])
 def test_wrong_keywords_are_refused_in_a_line(keywords: dict[str, object], said: str) -> None:
@@ -107,6 +109,18 @@ def test_games_together_are_the_same_as_one_after_the_other() -> None:
         if given is not None:
             first, second = together.step(given), apart.step(given)
     assert first[-1]['time_s'].max() < 2.1
+
+
+def test_seeds_of_several_games_are_one_or_one_for_each() -> None:
+    together = GamesTogether(2, game='cut_in', vary={'speed': 4.0})
+    first = together.reset(seed=3)[0]['state']
+    for seed in (np.int64(3), [3, 4], [np.int64(3), 4]):
+        assert (together.reset(seed=seed)[0]['state'] == first).all()
+    for seeds in ([1], [1, 2, 3]):
+        with pytest.raises(InputError, match='one for each of the 2 games'):
+            together.reset(seed=seeds)
+    with pytest.raises(InputError, match='num_envs'):
+        GamesTogether(2.5, game='cut_in')  # type: ignore[arg-type]
 
 
 def test_manoeuvres_and_histories_together_are_those_of_single_games() -> None:

@@ -101,3 +101,13 @@ def test_the_page_shows_the_environment_and_steers_nothing() -> None:
     finally:
         env.close()
     assert env.page is None
+    slower = DrivingEnv(game='cut_in', render_mode='human', ticks=4)
+    try:
+        slower.reset(seed=0)
+        began_s = time.monotonic()
+        for _ in range(2):
+            slower.step(STILL)
+        # Also if a decision takes several scenario steps.
+        assert time.monotonic() - began_s > 0.6
+    finally:
+        slower.close()

@@ -115,7 +115,9 @@ def test_links_and_members_beyond_the_limit_are_no_scenarios(tmp_path: Path) -> 
     pack(tmp_path / 'bomb.zip', {
         'USA_Bomb-1_1_T-1.xml': b'<commonRoad benchmarkID="USA_Bomb-1_1_T-1">'.ljust(
             MAX_BYTES + 1)})
-    for name in ('a.tar.gz', 'bomb.zip'):
+    for kind in ('unprintable.zip', 'unprintable.tar'):
+        pack(tmp_path / kind, {'USA_\x07-1_1_T-1.xml': scenario('USA_Bell-1_1_T-1')})
+    for name in ('a.tar.gz', 'bomb.zip', 'unprintable.zip', 'unprintable.tar'):
         store_place(tmp_path / name)
     assert len(all_ids()) == OWN
 
@@ -166,5 +168,9 @@ def test_files_go_before_ids_and_patterns_stand_for_many(tmp_path: Path) -> None
     assert find_scenario('missing.xml', tmp_path) == tmp_path / 'missing.xml'
     assert find_scenario('USA_A-2_1_T-1', tmp_path) == files[1]
     assert find_scenarios(['USA_A-*', 'some/folder'], place) == (*map(str, files), 'some/folder')
+    ids = [path.stem for path in reversed(files)]
+    assert find_scenarios([*ids, ids[0]]) == (str(files[1]), str(files[0]), str(files[1]))
+    with pytest.raises(InputError, match='USA_B-1_1_T-1'):
+        find_scenarios([*ids, 'USA_B-1_1_T-1'])
     with pytest.raises(InputError, match='no scenario has an id like this'):
         find_scenarios(['BEL_*'])

@@ -219,3 +219,6 @@ def test_reacts_to_a_vehicle_that_appears_later(vehicle: VehicleParameters) -> N
     free = planner(10.0).plan(support.request(ego(vehicle, 10.0))).states
     braked = planner(10.0).plan(asked).states
     assert braked[-1, 3] < free[-1, 3] - 3.0
+    # Not before it is there.
+    asked.obstacle_poses[:20] = math.nan
+    assert np.array_equal(planner(10.0).plan(asked).states[:20], free[:20])

@@ -5,11 +5,12 @@
 import logging
 import math
 
-from crgame_ros.errors import PlanningError
+from crgame_ros.errors import InputError, PlanningError
 from crgame_ros.messages.plan import Plan
 from crgame_ros.planner.adapter import PlannerAdapter
 from crgame_ros.planner.interface import Planner
 from crgame_ros.planner.plan_check import check_plan
+from crgame_ros.planner.reactive_package import ReactivePackagePlanner
 from crgame_ros.planner.registry import create_planner
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
@@ -99,6 +100,11 @@ def test_package_planners_survive_absent_obstacles(vehicle: VehicleParameters) -
         asked.obstacle_poses[12:, 1] = math.nan
         plan = made.plan(asked)
         assert check_plan(plan, asked.ego, 0, vehicle, support.DT) is None
+
+
+def test_reactive_package_needs_two_levels() -> None:
+    with pytest.raises(InputError, match='"levels" is 1; give 2 or more'):
+        ReactivePackagePlanner(levels=1)
 
 
 def test_idm_package_advances_as_its_speed_says(vehicle: VehicleParameters) -> None:

@@ -79,6 +79,28 @@ def failing() -> Policy:
     return Policy(act)
 
 
+def failing_later() -> Policy:
+    """Fail at the fourth decision and from then on."""
+    decided = 0
+
+    def begin() -> None:
+        nonlocal decided
+        decided = 0
+
+    def act(seen: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+        nonlocal decided
+        decided += 1
+        if decided > 3:
+            raise RuntimeError('no weights')
+        return follow_lane(seen)
+    return Policy(act, ticks=3, begin=begin)
+
+
+def no_keys() -> Policy:
+    """List parts where keys of the observation are needed."""
+    return Policy(follow_lane, observation=['state'])  # type: ignore[arg-type]
+
+
 def nothing() -> int:
     """Return a value that is no policy."""
     return 3

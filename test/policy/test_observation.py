@@ -5,16 +5,19 @@
 import math
 from pathlib import Path
 
+from commonroad.scenario.scenario import Scenario
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import load_game
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.policy.observation import Observation, ObservationHistory
 from crgame_ros.policy.observation_spec import ObservationSpec
-from crgame_ros.policy.route_guide import RouteGuide
+from crgame_ros.policy.route_guide import RESERVE, RouteGuide
+from crgame_ros.policy.seat_view import Surrounded, Things
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.vehicle.state import VehicleState
+from made_roads import made, Piece
 import numpy as np
 import pytest
 import shapely
@@ -41,9 +44,8 @@ def observed(setup: Setup, guide: RouteGuide, state: VehicleState, spec: Observa
              poses: np.ndarray, velocities: np.ndarray) -> dict[str, np.ndarray]:
     """Observe one vehicle."""
     guide.restart(state)
-    made = Observation(
-        spec, setup.avs[0].vehicle, THINGS, setup.loaded.scenario).observe(
-        [state], [guide.follow(state)], [guide], poses[None], velocities[None])
+    made = Observation(spec, setup.avs[0].vehicle, setup.loaded.scenario).observe(
+        [Surrounded(state, poses, velocities, Things(THINGS))], [guide.follow(state)], [guide])
     return {part: values[0] for part, values in made.items()}
 
 
@@ -75,7 +77,7 @@ def test_the_route_is_the_path_ahead_and_the_place_on_it(setup: Setup, guide: Ro
                     np.full((4, 3), np.nan), np.full((4, 3), np.nan))
     assert seen['state'][:7] == pytest.approx(
         (12.0, -1.0, 0.02, 0.05, 1.5, 0.1, curvature), abs=1e-4)
-    assert seen['state'][7] == pytest.approx(guide._limits[round(s / path.step)])
+    assert seen['state'][7] == pytest.approx(guide._route.limits[round(s / path.step)])
     # Back into the map: the same points.
     cos, sin = math.cos(state.yaw), math.sin(state.yaw)
     for row, ahead in zip(seen['route'], (10.0, 20.0, 30.0, 40.0), strict=True):
@@ -91,6 +93,22 @@ def test_progress_is_the_way_driven_along_the_route(guide: RouteGuide) -> None:
     guide.restart(states[0])
     assert [guide.follow(state).progress for state in states] == pytest.approx(
         (0.0, 2.0, 3.0, -1.0), abs=1e-6)
+
+
+def test_a_route_planned_anew_is_not_that_of_the_next_drive(setup: Setup) -> None:
+    scenario = Scenario(0.1)
+    scenario.add_objects(made({1: Piece((0.0, 0.0, 0.0), 2000.0, after=(2,)),
+                               2: Piece((2000.0, 0.0, 0.0), 2000.0, after=(3,)),
+                               3: Piece((4000.0, 0.0, 0.0), 2000.0)}).lanelet_network)
+    start = VehicleState(50.0, 0.0, 0.0, 10.0)
+    guide = RouteGuide(scenario, None, start, setup.humans[0].vehicle)
+    first, end = guide.driving, guide.driving.path.length
+    for s in (end - RESERVE - 5.0, end - RESERVE + 5.0):
+        guide.follow(VehicleState(*first.path.pose_at(np.array(s)).tolist()[:3], 10.0))
+    assert guide.driving is not first
+    guide.restart(start)
+    assert guide.driving is guide.first is first
+    assert guide.follow(start).s == pytest.approx(first.start_s)
 
 
 def test_the_lidar_measures_as_shapely_does(setup: Setup, guide: RouteGuide) -> None:

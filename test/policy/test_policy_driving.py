@@ -68,8 +68,29 @@ def test_a_policy_that_fails_brakes_as_every_planner_that_fails() -> None:
     assert 'no weights' in next(iter(record.statistics.reasons))
 
 
+def test_a_policy_that_fails_is_asked_again_and_its_last_action_not_held() -> None:
+    record = driven('cut_in', 'failing_later', av=True, seconds=2.0).planners['av0']
+    # It decides at every third step until it fails at the fourth decision, and brakes from then.
+    assert record.statistics.plans == 20
+    assert record.statistics.fallbacks == 11
+
+
+def test_a_driver_whose_policy_fails_is_lost_and_its_vehicle_stopped() -> None:
+    said: list[str] = []
+    game = load_game(SCENARIOS / 'lane_change.yaml')
+    game = replace(game, humans=(replace(
+        game.humans[0], driver=f'policy:{HERE}:failing_later'),))
+    result = run_offline(build_setup(game), duration_s=25.0, say=said.append)
+    assert [text for text in said if 'no weights' in text] == [
+        'hv0: the policy has failed (RuntimeError: no weights); mend it and reset the run']
+    assert result.commands[150:, 0, 0].max() == 0.0
+    assert result.commands[300, 0, 1] == pytest.approx(0.15)
+    assert abs(result.states_of('hv0')[-1, StateColumn.SPEED]) < 0.01
+
+
 @pytest.mark.parametrize(('name', 'said'), [
     (f'{HERE}:nobody', 'has no function'), (f'{HERE}:nothing', 'returns a int'),
+    (f'{HERE}:no_keys', 'is no mapping'),
     ('nowhere.py:load', 'there is no file'), ('load', 'does not name a policy'),
     (f'{HERE.with_name("conftest.txt")}:x', 'does not name a policy')])
 def test_what_is_no_policy_is_refused_in_a_line(name: str, said: str) -> None:

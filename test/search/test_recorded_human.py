@@ -55,6 +55,18 @@ def test_the_game_as_it_is_repeats_the_humans_path(recorded: tuple[Path, Offline
     assert np.abs(apart).max() < 0.5
 
 
+def test_a_game_that_was_edited_stays(recorded: tuple[Path, OfflineResult],
+                                      tmp_path: Path) -> None:
+    run, _ = recorded
+    path = game_of_run(run, tmp_path, other_planners=False)
+    assert game_of_run(run, tmp_path, other_planners=True) == path
+    edited = path.read_text() + '# mine\n'
+    path.write_text(edited)
+    with pytest.raises(InputError, match='is another game than that of the run'):
+        game_of_run(run, tmp_path, other_planners=False)
+    assert path.read_text() == edited
+
+
 def test_the_human_comes_later_and_faster(recorded: tuple[Path, OfflineResult],
                                           tmp_path: Path) -> None:
     run, result = recorded

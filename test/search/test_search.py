@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`crgame search` finds where a planner fails, as closed forms say, and goes on when killed."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 import json
 import math
@@ -13,15 +14,23 @@ import subprocess
 import sys
 import time
 
+from crgame_ros.errors import InputError
+from crgame_ros.evaluation.cell_grid import make_grid
+from crgame_ros.evaluation.file_names import GRID_FILE, VARIANTS_FILE
+from crgame_ros.evaluation.folder import EvaluationFolder
+from crgame_ros.evaluation.plan import EvaluationPlan, PlannerChoice
 from crgame_ros.game.game import load_game
+from crgame_ros.game.variation_spec import Constraint
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.schema.writing import write
 from crgame_ros.search.boundary import Boundary, importance_interval, pool_of
-from crgame_ros.search.trials import Outcome
+from crgame_ros.search.search import _along_line, explore, shrink
+from crgame_ros.search.settings import Goal, SearchSettings
+from crgame_ros.search.trials import Outcome, Trials
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
-from crgame_ros.variation.space import game_of, space_of
+from crgame_ros.variation.space import game_of, space_of, VariantSpace
 import numpy as np
 import pytest
 
@@ -155,12 +164,102 @@ def test_what_cannot_be_searched_is_refused_in_one_line(tmp_path: Path) -> None:
             (('cut_in', '--budget', '5'), 'nothing varies'),
             (('cut_in_family', '--minimise', 'tttc'), 'did you mean worst_ttc'),
             ((str(tmp_path),), 'is neither a search nor a recorded run'),
+            (('cut_in_family', '--keep', '-1'), '--keep: is -1'),
             (('cut_in_family', '--budget', '0'), '--budget: is 0')):
         done = subprocess.run([sys.executable, '-m', 'crgame_ros.cli', 'search', *words],
                               cwd=tmp_path, capture_output=True, text=True, check=False)
         assert (done.returncode, done.stdout) == (2, '')
         assert told in done.stderr and done.stderr.count('\n') == 1
     assert not any(tmp_path.iterdir())
+
+
+def test_a_search_that_goes_on_has_no_other_settings(tmp_path: Path) -> None:
+    (tmp_path / 'search.json').write_text('{}')
+    done = subprocess.run([sys.executable, '-m', 'crgame_ros.cli', 'search', str(tmp_path),
+                           '--seed', '0'], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and '--seed: is of a new search' in done.stderr
+
+
+def family(*constraints: str) -> VariantSpace:
+    """Return the space of the family with more constraints."""
+    game = load_game(FAMILY)
+    return space_of(write(replace(game, vary=(*game.vary, *map(Constraint, constraints))),
+                          game.base), '')
+
+
+class ByClosedForm(Trials):
+    """Trials whose outcomes are those of the closed form, without a run."""
+
+    def __init__(self) -> None:
+        self._settings, self.outcomes, self._by_text = SETTINGS, [], {}
+
+    def _run(self, new: Mapping[str, Mapping[str, object]]) -> None:
+        for text, variant in new.items():
+            self._by_text[text] = Outcome(len(self.outcomes), variant, text, 'ok', '', (0.0,),
+                                          ('contact',) if fails(dict(variant)) else ())
+            self.outcomes.append(self._by_text[text])
+
+
+SETTINGS = SearchSettings('game.yaml', (Goal('ttc', 1),), sampler='random', batch=1)
+
+
+def test_variants_are_added_to_a_folder_one_batch_after_the_other(tmp_path: Path) -> None:
+    place = EvaluationFolder(tmp_path)
+    plan = EvaluationPlan(games=(str(FAMILY),), planners=(PlannerChoice('idm'),), seeds=[0])
+    grid = make_grid(plan, place.store)
+    place.begin(plan, replace(grid, scenes=(replace(grid.scenes[0], variants=()),)))
+    written = (tmp_path / GRID_FILE).read_bytes()
+    first, second, third = pool_of(family(), 4, 0)[:3]
+    place.add_variants([first, second])
+    with (tmp_path / VARIANTS_FILE).open('a') as stream:
+        # As a machine that fails may leave it.
+        stream.write('\n{"gap": 3')
+    place.add_variants([second, third])
+    assert place.grid().scenes[0].variants == (first, second, third)
+    assert (tmp_path / GRID_FILE).read_bytes() == written
+
+
+def test_constraints_that_nothing_keeps_are_refused() -> None:
+    trials, space = ByClosedForm(), family('gap > 1000')
+    with pytest.raises(InputError, match='none of 100 points keeps the constraints'):
+        explore(space, trials, SETTINGS, 10)
+    assert trials.outcomes == []
+    with pytest.raises(InputError, match='none of 64 points keeps the constraints'):
+        pool_of(space, 64, 0)
+
+
+def test_exploration_goes_on_after_variants_that_were_run_before() -> None:
+    space = space_of({'scenario': 'x.xml', 'vary': [
+        {'name': name, 'from': 1, 'to': 2, 'whole': True, 'nominal': 1}
+        for name in ('gap', 'difference', 'deceleration')]}, '')
+    trials = ByClosedForm()
+    explore(space, trials, SETTINGS, 6)
+    assert len(trials.outcomes) == 6
+    # It ends though there are no 9 variants.
+    explore(space, trials, SETTINGS, 3)
+    assert len(trials.outcomes) <= 8
+
+
+def test_a_line_to_the_game_is_halved_where_variants_are_left_out() -> None:
+    # The first of the points between them, at a gap of 9 m, is not allowed.
+    space, trials = family('gap < 8.9 or gap > 9.05'), ByClosedForm()
+    first = {'gap': 2.0, 'difference': 10.0, 'deceleration': 6.0}
+    best = trials.run([space.nominal, first])[1]
+    _along_line(space, trials, best, 60)
+    assert all(space.is_allowed(each.variant) for each in trials.outcomes)
+    gaps = {kind: [float(str(each.variant['gap'])) for each in trials.outcomes
+                   if each.is_failure is kind] for kind in (True, False)}
+    assert 0.0 < min(gaps[False]) - max(gaps[True]) < 0.1
+
+
+def test_a_game_that_fails_as_it_is_needs_no_change() -> None:
+    trials = ByClosedForm()
+    first = {'gap': 2.0, 'difference': 10.0, 'deceleration': 6.0}
+    space = space_of({'scenario': 'x.xml', 'vary': [
+        {'name': name, 'from': 0.0, 'to': 50.0, 'nominal': value}
+        for name, value in first.items()]}, '')
+    assert trials.run([first])[0].is_failure
+    assert shrink(space, trials, SETTINGS, 9) is None
 
 
 def test_a_dimension_can_be_a_planner(tmp_path: Path) -> None:

@@ -57,6 +57,14 @@ def test_keys_are_set_by_ids_names_and_indices() -> None:
     assert made.vary == ()
 
 
+def test_a_game_whose_value_a_lognormal_distribution_cannot_have_is_refused() -> None:
+    entry = {'name': 'seed', 'key': 'seed', 'mean': 3.0, 'deviation': 0.4,
+             'distribution': 'lognormal'}
+    with pytest.raises(InputError, match=r'"seed" is 0 in the game as it is; give a `nominal`'):
+        space(entry, seed=0)
+    assert space(entry | {'nominal': 1.0}, seed=0).distance({'seed': 1.0}, {'seed': 1.0}) == 0.0
+
+
 def test_a_game_as_it_is_has_the_values_of_its_file() -> None:
     game = load_game(FAMILY)
     nominal = space_of(write(game, game.base), '').nominal

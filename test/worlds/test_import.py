@@ -15,6 +15,7 @@ from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.worlds.environments import SUMO_TOOLS
 from crgame_ros.worlds.kinds import find_kind
 from crgame_ros.worlds.lanelet2 import mercator_degrees, prepare_lanelet2, tangent_plane
+from crgame_ros.worlds.mending import mend_map
 from lxml import etree
 from made_maps import lanelet2, opendrive, openstreetmap
 import numpy as np
@@ -155,6 +156,36 @@ def test_the_plane_of_a_map_is_true_and_passes_the_projection_of_converters() ->
     assert np.stack((x, y), axis=-1) == pytest.approx(positions, abs=1e-6)
 
 
+def test_heights_that_are_no_numbers_are_left_out() -> None:
+    root = etree.fromstring(lanelet2(True))
+    for number, node in enumerate(root.iterchildren('node')):
+        etree.SubElement(node, 'tag', k='ele', v='12 m' if number else '12')
+    prepare_lanelet2(root, 'a map')
+    assert not root.findall('node/tag[@k="ele"]')
+
+
+def test_only_the_last_part_of_a_lanelet_has_its_light_and_enters_a_junction() -> None:
+    # More than a full turn, on itself.
+    turned = np.linspace(0.0, 2.4 * math.pi, 200)
+
+    def bound(side: str, radius: float) -> str:
+        points = ''.join(f'<point><x>{radius * math.sin(angle)}</x><y>{-radius * math.cos(angle)}'
+                         '</y></point>' for angle in turned)
+        return f'<{side}Bound>{points}</{side}Bound>'
+
+    root = etree.fromstring(
+        f'<commonRoad><lanelet id="1">{bound("left", 18.0)}{bound("right", 21.5)}'
+        '<laneletType>urban</laneletType><trafficLightRef ref="9"/></lanelet>'
+        '<trafficLight id="9"><cycle/></trafficLight><intersection id="7"><incoming id="8">'
+        '<incomingLanelet ref="1"/></incoming></intersection></commonRoad>')
+    mend_map(root, None, 0.1)
+    parts = root.findall('lanelet')
+    assert len(parts) > 1
+    last = next(part for part in parts if part.find('successor') is None)
+    assert [part for part in parts if part.find('trafficLightRef') is not None] == [last]
+    assert root.find('.//incomingLanelet').get('ref') == last.get('id')
+
+
 @pytest.mark.parametrize(('name', 'content', 'what'), [
     ('a.xml', '<commonRoad/>', 'is a CommonRoad scenario already'),
     ('a.txt', 'lanes', 'is no XML'),
@@ -163,7 +194,9 @@ def test_the_plane_of_a_map_is_true_and_passes_the_projection_of_converters() ->
     ('a.xodr', '<!DOCTYPE x [<!ENTITY e "e">]><OpenDRIVE>&e;</OpenDRIVE>', 'document type'),
     ('a.xodr', '<OpenDRIVE><header/></OpenDRIVE>', 'no lane was found in it'),
     ('a.osm', '<osm><relation id="1"><tag k="type" v="lanelet"/></relation></osm>',
-     'its nodes have neither')])
+     'its nodes have neither'),
+    ('a.xodr', '<OpenDRIVE><road><planView><geometry><arc curvature="left"/></geometry></planView>'
+     '</road></OpenDRIVE>', 'has a value that is no number')])
 def test_what_is_no_map_is_refused_in_a_line(tmp_path: Path, name: str, content: str,
                                              what: str) -> None:
     source = tmp_path / name
