@@ -15,6 +15,7 @@ from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.file_names import FILES, GRID_FILE
 from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
+from crgame_ros.evaluation.results.parts import LOCK
 from crgame_ros.recording.export import prepare_folder
 from crgame_ros.recording.run_folder import PACKAGE_FILE
 from crgame_ros.schema.writing import write
@@ -28,8 +29,7 @@ class EvaluationFolder:
     """
     An evaluation on disk.
 
-    :param path: path of its folder; it is created if it is missing.
-    :raises InputError: if it cannot be written, or contains other files.
+    :param path: path of its folder.
     """
 
     def __init__(self, path: Path) -> None:
@@ -37,16 +37,24 @@ class EvaluationFolder:
         self.path = path = path.resolve()
         self.store = ContentStore(path / FILES)
 
-    def begin(self, plan: EvaluationPlan, grid: CellGrid) -> None:
+    def check(self) -> None:
         """
-        Write the plan and the grid.
+        Create the folder, before anything is written into it.
 
         :raises InputError: if the folder cannot be written, or contains other files.
         """
         prepare_folder(self.path)
-        if any(self.path.iterdir()) and not (self.path / GRID_FILE).exists() \
-                and {item.name for item in self.path.iterdir()} - {FILES}:
+        names = {item.name for item in self.path.iterdir()}
+        # One that was interrupted early has only files, or the tables' lock.
+        if names - {FILES} and not names & {GRID_FILE, LOCK}:
             raise InputError('something else is in it', str(self.path), 'name another folder')
+
+    def begin(self, plan: EvaluationPlan, grid: CellGrid) -> None:
+        """
+        Write the plan and the grid, after `check`.
+
+        :raises InputError: if the folder cannot be written.
+        """
         self.write_grid(plan, grid)
         package = {
             '$schema': PROFILE.format('datapackage'),
