@@ -88,9 +88,11 @@ def evaluate(plan: EvaluationPlan, folder: Path, computing: Computing | None = N
     """
     computing = computing or Computing()
     place = EvaluationFolder(folder)
-    grid = make_grid(plan, place.store, loading)
-    place.begin(plan, grid)
+    place.check()
+    # Under the lock: another evaluation that still writes there keeps its plan.
     with ResultParts(folder, computing.part_cells) as parts:
+        grid = make_grid(plan, place.store, loading)
+        place.begin(plan, grid)
         tally = EvaluationTally(len(grid))
         tally.put_away = _sort(parts, grid, computing.retry)
         finished = {bytes.fromhex(key) for key in parts.keys()}

@@ -18,6 +18,7 @@ from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.file_names import FILES, GRID_FILE, VARIANTS_FILE
 from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
+from crgame_ros.evaluation.results.parts import LOCK
 from crgame_ros.recording.export import prepare_folder
 from crgame_ros.recording.run_folder import PACKAGE_FILE
 from crgame_ros.schema.writing import write
@@ -32,8 +33,7 @@ class EvaluationFolder:
     """
     An evaluation on disk.
 
-    :param path: path of its folder; it is created if it is missing.
-    :raises InputError: if it cannot be written, or contains other files.
+    :param path: path of its folder.
     """
 
     def __init__(self, path: Path) -> None:
@@ -41,16 +41,24 @@ class EvaluationFolder:
         self.path = path = path.resolve()
         self.store = ContentStore(path / FILES)
 
-    def begin(self, plan: EvaluationPlan, grid: CellGrid) -> None:
+    def check(self) -> None:
         """
-        Write the plan and the grid.
+        Create the folder, before anything is written into it.
 
         :raises InputError: if the folder cannot be written, or contains other files.
         """
         prepare_folder(self.path)
-        if any(self.path.iterdir()) and not (self.path / GRID_FILE).exists() \
-                and {item.name for item in self.path.iterdir()} - {FILES}:
+        names = {item.name for item in self.path.iterdir()}
+        # One that was interrupted early has only files, or the tables' lock.
+        if names - {FILES} and not names & {GRID_FILE, LOCK}:
             raise InputError('something else is in it', str(self.path), 'name another folder')
+
+    def begin(self, plan: EvaluationPlan, grid: CellGrid) -> None:
+        """
+        Write the plan and the grid, after `check`.
+
+        :raises InputError: if the folder cannot be written.
+        """
         note = {'format': FORMAT, 'version': __version__, 'plan': write(plan),
                 'base': str(plan.base.resolve()),
                 'grid': grid.as_dict()}

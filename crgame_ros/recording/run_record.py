@@ -207,13 +207,18 @@ class RunRecord:
 
     @property
     def put_back(self) -> dict[str, tuple[int, ...]]:
-        """Return the last steps k before vehicles were put back on their lane, by vehicle."""
+        """
+        Return the last steps k before vehicles were put back on their lane, by vehicle.
+
+        What happened before the log begins is no part of it.
+        """
         scheduler = self.log.game.scheduler
         found: dict[str, tuple[int, ...]] = {}
         for event in self.fired:
             if event.vehicle is not None:
                 k = scheduler.k0 + (event.n - 1) // scheduler.steps_per_tick
-                found[event.vehicle] = (*found.get(event.vehicle, ()), k)
+                if k >= self.log.ks[0]:
+                    found[event.vehicle] = (*found.get(event.vehicle, ()), k)
         return found
 
     def jumps(self, column: int) -> tuple[int, ...]:

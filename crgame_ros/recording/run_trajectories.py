@@ -6,10 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from crgame_ros.drivability.monitor import road_transforms
 from crgame_ros.errors import InputError, one_line
 from crgame_ros.game.documents import GAME, GameDocument
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
+from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joints import (
     OBJECT_STATES_TOPIC,
     TICK_STATES_TOPIC,
@@ -88,6 +90,11 @@ class RunTrajectories:
     def objects(self) -> tuple[ObjectDescription, ...]:
         """Return the descriptions of the M other objects."""
         return self.descriptions[self.vehicle_states.shape[1]:]
+
+    @property
+    def road_transforms(self) -> tuple[RigidTransform, ...]:
+        """Return the transform of each driven vehicle to the road's coordinates (CRG 28)."""
+        return road_transforms(len(self.game.humans), [av.transform for av in self.game.avs])
 
     @property
     def finite_vehicle_states(self) -> FloatArray:

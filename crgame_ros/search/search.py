@@ -113,6 +113,8 @@ def begin(settings: SearchSettings, folder: Path) -> None:
     plan = EvaluationPlan(games=(str(path.resolve()),), planners=(choice,), seeds=[game.seed])
     if there:
         settings.write(folder)
+    else:
+        place.check()
     grid = make_grid(plan, place.store)
     if not there:
         place.begin(plan, grid)

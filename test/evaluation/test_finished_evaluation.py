@@ -5,6 +5,8 @@
 from pathlib import Path
 
 import crgame_ros
+from crgame_ros.evaluation.folder import EvaluationFolder
+from crgame_ros.evaluation.results.parts import ResultParts
 import pytest
 
 GAME = crgame_ros.scenarios_directory() / 'cut_in.yaml'
@@ -41,3 +43,19 @@ def test_what_is_no_plan_is_an_input_error(plan: object, said: str, tmp_path: Pa
     with pytest.raises(crgame_ros.InputError, match=said):
         crgame_ros.evaluate(plan, tmp_path / 'out')  # type: ignore[arg-type]
     assert not (tmp_path / 'out').exists()
+
+
+def test_a_refused_evaluation_leaves_the_folder_as_it_was(tmp_path: Path) -> None:
+    """Another process writes there, or it holds something else; interrupted, it goes on."""
+    with ResultParts(tmp_path):
+        before = sorted(tmp_path.iterdir())
+        with pytest.raises(crgame_ros.InputError, match='another evaluation writes there'):
+            crgame_ros.evaluate(PLAN, tmp_path)
+        assert sorted(tmp_path.iterdir()) == before
+    EvaluationFolder(tmp_path).check()
+    other = tmp_path / 'other'
+    other.mkdir()
+    (other / 'letter.txt').touch()
+    with pytest.raises(crgame_ros.InputError, match='something else is in it'):
+        crgame_ros.evaluate(PLAN, other)
+    assert [path.name for path in other.iterdir()] == ['letter.txt']

@@ -2,17 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who kept the rules of a junction with lights and a stop sign, offline and from a recording."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.report.outcome_section import outcome_section
+from crgame_ros.analysis.rules.vehicle_rules import measure_rules
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.cli import main
 from crgame_ros.evaluation.judging import check_expectations, shortfalls
 from crgame_ros.evaluation.results.cell_rows import vehicle_rows
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.game import load_game
+from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.run_record import run_record_of
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
@@ -72,6 +77,15 @@ def test_a_red_light_that_the_human_runs(tmp_path: Path, recorder: Any,
     recorded = Run.of_recording(tmp_path / 'run', scoring='none')
     assert recorded.usual_rules == Run('lit', result=result).usual_rules
     passed, = recorded.usual_rules[0].passed
+    # With an AV that plans elsewhere than it drives, the human's road is that of its plans.
+    record = run_record_of(result)
+    transform = RigidTransform(0.7, 120.0, -40.0)
+    states = record.log.vehicle_states.copy()
+    states[..., :3] = transform.to_simulation(states[..., :3])
+    log = replace(record.log, vehicle_states=states, published_states=states, game=replace(
+        record.log.game, avs=(replace(record.log.game.avs[0], transform=transform),)))
+    moved, = measure_rules(replace(record, log=log), measure_log(log))[0].passed
+    assert moved.k == pytest.approx(passed.k) and moved.lanelet == passed.lanelet
     # Its front is 10.7 m from the line at the start, its speed 6 m/s.
     assert (passed.kind, passed.lanelet) == ('red light', 31)
     assert 16.0 < passed.k < 30.0

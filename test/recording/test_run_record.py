@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The measures' input from a recording is the same as from the run itself."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from crgame_ros.analysis.scores.scored_drives import score_drives
+from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_game import recorded_inputs
@@ -31,3 +34,24 @@ def test_a_recording_has_the_same_record(recorder: Any, tmp_path: Path) -> None:
         assert np.array_equal(record.commands[:, 1, 4], result.av_commands[1:, 0, 4])
         assert record.fired == result.fired
         assert np.array_equal(record.log.ks, here.log.ks)
+
+
+def test_a_vehicle_put_back_before_the_log_begins_does_not_jump_in_it() -> None:
+    """The log holds 1 s to 3 s: what was put back at 0.5 s counts no more, at 2 s it does."""
+    setup = build_setup(load_game(scenarios_directory() / 'cut_in.yaml'))
+    drivers, intervals_s = recorded_inputs(setup)
+    record = run_record_of(run_offline(setup, duration_s=3.0, drivers=drivers,
+                                       intervals_s=intervals_s))
+    log = record.log
+    log = replace(log, ks=log.ks[10:], vehicle_states=log.vehicle_states[10:],
+                  published_states=log.published_states[10:],
+                  object_poses=log.object_poses[10:],
+                  object_velocities=log.object_velocities[10:])
+    early, late = (replace(record, log=log, fired=(FiredEvent.put_back('hv0', n, n // 10),))
+                   for n in (50, 200))
+    assert early.put_back == {} and early.jumps(0) == ()
+    assert early.ways()[0] > late.ways()[0]
+    scores = score_drives(log, put_back=early.put_back)
+    assert scores[0].remarks == score_drives(log)[0].remarks
+    row, = late.jumps(0)
+    assert 2.0 <= 0.1 * int(log.ks[row]) <= 2.1

@@ -44,7 +44,6 @@ from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.events import FiredEvent, SpeedLimit
 from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
-from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import parse_scenario
@@ -251,14 +250,14 @@ class _Everybody:
         self._outlines = [outline(item.shape, _CIRCLE_CORNERS) for item in log.descriptions]
         self._ahead = np.array([item.rear_to_center for item in log.vehicles])
 
-    def transform(self, number: int) -> RigidTransform:
-        """Return the transform into the coordinates of a driven vehicle's road."""
-        av = self.record.log.game.av(self.ids[number])
-        return RigidTransform() if av is None else av.transform
+    def at(self, row: int, number: int) -> tuple[list[FloatArray], FloatArray]:
+        """
+        Return centres with corners (C + 1, 2) each, and velocities (N, 2), at a step.
 
-    def at(self, row: int, transform: RigidTransform) -> tuple[list[FloatArray], FloatArray]:
-        """Return centres with corners (C + 1, 2) each, and velocities (N, 2), at a step."""
+        :param number: the driven vehicle whose road gives the coordinates.
+        """
         log = self.record.log
+        transform = log.road_transforms[number]
         states = log.vehicle_states[row]
         centers = shifted(states[:, :3], self._ahead)
         moves = shifted_velocities(centers[:, 2], pose_rates(states), self._ahead)
@@ -275,9 +274,8 @@ def _measured(everybody: _Everybody, number: int, limits: ResponseLimits,
     log, vehicle_id = record.log, everybody.ids[number]
     game: GameDocument = log.game
     vehicle = game.vehicles[number].vehicle
-    transform = everybody.transform(number)
     states = log.vehicle_states[:, number].copy()
-    states[:, :3] = transform.to_scenario(states[:, :3])
+    states[:, :3] = log.road_transforms[number].to_scenario(states[:, :3])
     keeping = keep_lane(everybody.roads, states, vehicle, everybody.step_s,
                         record.jumps(number))
     dt_s = game.scheduler.dt_s
@@ -358,7 +356,7 @@ def _gap(everybody: _Everybody, number: int, keeping: LaneKeeping,
     side = 'left' if change.side > 0 else 'right'
     if change.wheel is None:
         return LaneChangeGap(math.nan, side, AcceptedGap(None, None), None, None)
-    outlines, velocities = everybody.at(change.wheel, everybody.transform(number))
+    outlines, velocities = everybody.at(change.wheel, number)
     others = [each for each in range(len(outlines)) if each != number]
     gap = gap_in_lane(keeping.strips[change.visit], outlines[number], velocities[number],
                       [outlines[each] for each in others], velocities[others])

@@ -65,10 +65,8 @@ def measure_rules(record: RunRecord, criticality: Criticality) -> tuple[VehicleR
     found = []
     for column, (item, critical) in enumerate(zip(
             log.vehicles, criticality.report(), strict=True)):
-        av = log.game.av(item.id)
-        states = log.vehicle_states[:, column]
-        if av is not None:
-            states = np.column_stack((av.transform.to_scenario(states[:, :3]), states[:, 3:]))
+        states = log.vehicle_states[:, column].copy()
+        states[:, :3] = log.road_transforms[column].to_scenario(states[:, :3])
         passed = rules.passed(DrivenTrack(
             states, log.ks, item.rear_to_center, item.rear_to_center + 0.5 * item.shape.length,
             record.jumps(column)))

@@ -95,12 +95,10 @@ def drive_of(log: RunTrajectories, vehicle: int) -> ScoredDrive:
 
     :param vehicle: its number among the driven ones.
     """
-    game = log.game
-    humans = len(game.humans)
     offsets = np.array([item.rear_to_center for item in log.vehicles])
     centers = shifted(log.vehicle_states[:, :, :3], offsets)
     poses = np.concatenate((centers, log.object_poses), axis=1)
-    if vehicle >= humans and not (transform := game.avs[vehicle - humans].transform).is_identity:
+    if not (transform := log.road_transforms[vehicle]).is_identity:
         # In the coordinates of its road.
         poses = transform.to_scenario(poses)
     speeds = log.vehicle_states[:, :, StateColumn.SPEED]
@@ -108,8 +106,9 @@ def drive_of(log: RunTrajectories, vehicle: int) -> ScoredDrive:
     everybody = np.concatenate((np.abs(speeds), others), axis=1)
     item = log.vehicles[vehicle]
     return ScoredDrive(
-        item.id, game.scheduler.time_step_s, item.shape, item.rear_to_center, poses[:, vehicle],
-        speeds[:, vehicle], _tracks((*log.vehicles, *log.objects), poses, everybody, vehicle))
+        item.id, log.game.scheduler.time_step_s, item.shape, item.rear_to_center,
+        poses[:, vehicle], speeds[:, vehicle],
+        _tracks((*log.vehicles, *log.objects), poses, everybody, vehicle))
 
 
 def drive_among(vehicle_id: str, shape: Shape, rear_to_center: float, poses: FloatArray,

@@ -11,6 +11,7 @@ from typing import Any
 
 from crgame_ros.analysis.behaviour.driver import DriverBehaviour, measure_behaviour
 from crgame_ros.analysis.behaviour.measures import MEASURES
+from crgame_ros.analysis.scores.scored_drive import drive_of
 from crgame_ros.driver.source import ReplayDriver
 from crgame_ros.game.game import load_game
 from crgame_ros.geometry.angles import wrap_pi_array
@@ -203,19 +204,21 @@ def test_nothing_depends_on_the_maps_axes(
     np.testing.assert_allclose(found[finite], expected[finite], rtol=1e-9, atol=1e-9)
 
 
-def test_an_av_is_measured_where_its_road_is(changed: tuple[DriverBehaviour, ...]) -> None:
-    """Driven elsewhere than it plans (CRG 9): the same values as where the road is."""
+def test_all_are_measured_where_their_road_is(changed: tuple[DriverBehaviour, ...]) -> None:
+    """The AV drives elsewhere than it plans (CRG 9), the human with it: values as on the road."""
     record = _play('lane_change', 12.0)
     transform = RigidTransform(0.7, 120.0, -40.0)
     states = record.log.vehicle_states.copy()
     states[..., :3] = transform.to_simulation(states[..., :3])
     game = replace(record.log.game, avs=(
         replace(record.log.game.avs[0], transform=transform),))
-    moved = measure_behaviour(replace(record, log=replace(
-        record.log, game=game, vehicle_states=states)))[1]
-    assert moved.values == pytest.approx(changed[1].values, rel=1e-8, abs=1e-9, nan_ok=True)
-    assert np.isfinite(changed[1].tlc_s).any()
-    assert moved.tlc_s == pytest.approx(changed[1].tlc_s, rel=1e-6)
+    log = replace(record.log, game=game, vehicle_states=states)
+    for number, (moved, found) in enumerate(zip(
+            measure_behaviour(replace(record, log=log)), changed, strict=True)):
+        assert moved.values == pytest.approx(found.values, rel=1e-8, abs=1e-9, nan_ok=True)
+        assert np.isfinite(found.tlc_s).any()
+        assert moved.tlc_s == pytest.approx(found.tlc_s, rel=1e-6)
+        assert drive_of(log, number).poses == pytest.approx(drive_of(record.log, number).poses)
 
 
 def test_json_holds_no_number_that_is_none(changed: tuple[DriverBehaviour, ...]) -> None:

@@ -192,6 +192,37 @@ def test_two_cars_on_a_bend(cut_in: LoadedScenario, radius: float) -> None:
     assert found['drac'] == pytest.approx(8.0 / gap, rel=4e-3)
 
 
+@pytest.mark.parametrize('distance', [20.0, -20.0])
+@pytest.mark.parametrize('spur', [False, True], ids=['ring', 'way into a ring'])
+def test_a_ring_counts_once(cut_in: LoadedScenario, distance: float, spur: bool) -> None:
+    """A car 20 m ahead leads at every place of a ring of 251 m; one 20 m behind nowhere."""
+    radius, tangent = 40.0, np.linspace(-60.0, 0.0, 31)
+    halves = [np.linspace(start, start + np.pi, 200) for start in (0.0, np.pi)]
+    lanelets = [Lanelet(*(np.column_stack(((radius - d) * np.sin(angles),
+                                           radius - (radius - d) * np.cos(angles)))
+                          for d in (1.75, 0.0, -1.75)), number, successor=[3 - number])
+                for number, angles in enumerate(halves, start=1)]
+    if spur:
+        lanelets.append(Lanelet(*(np.column_stack((tangent, np.full_like(tangent, d)))
+                                  for d in (1.75, 0.0, -1.75)), 3, successor=[1]))
+    criticality = Criticality(_run(
+        _with_network(cut_in, LaneletNetwork.create_from_lanelet_list(lanelets)),
+        [_car('av0', Role.AUTONOMOUS)], [_car('o1', Role.RECORDED)]))
+
+    def pose(s: float) -> tuple[float, float, float]:
+        turned = max(s, 0.0) / radius
+        return (radius * math.sin(turned) + min(s, 0.0), radius * (1.0 - math.cos(turned)), turned)
+
+    gap = 20.0 - (2.25 if spur else 0.0) - (1 if spur else 2) * radius * math.atan2(
+        2.25, radius - 0.9)
+    places = np.arange(-15.0, -5.0) if spur else np.arange(0.0, 250.0, 5.0)
+    for tick, s in enumerate(places.tolist()):
+        criticality.observe(10 * tick, 0.0, _state(np.array(pose(s)), 5.0, 0.0)[None],
+                            ObjectStates(np.array([pose(s + distance)]), np.zeros((1, 3))))
+        found = criticality.latest[0].values[0, COLUMN['gap']]
+        assert found == pytest.approx(gap if distance > 0.0 else math.nan, abs=0.01, nan_ok=True)
+
+
 def test_the_nearest_in_the_corridor_leads(cut_in: LoadedScenario) -> None:
     """A cone that stands 10 cm into the corridor, not the car behind it, nor a wall beside."""
     cone = ObjectDescription('cone', 'unknown', Role.STATIC, Shape('circle', 0.4, 0.4))
