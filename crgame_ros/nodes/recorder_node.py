@@ -188,8 +188,7 @@ class RecorderNode(Node):
         self._endpoints.diagnostics.publish(f'recorder_node: {subject}', level, text, values)
 
     def _write_waiting(self, recorded: RecordedTopic) -> None:
-        while (taken := recorded.slot.pop_timed()) is not None:
-            data, published_ns, received_ns = taken
+        for data, published_ns, received_ns in recorded.slot.waiting_timed():
             published_ns, received_ns = self._log_clock.times_ns(
                 published_ns, received_ns, time.time_ns(), time.monotonic_ns())
             if recorded.latched:
