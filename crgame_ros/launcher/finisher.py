@@ -7,8 +7,9 @@ import json
 from pathlib import Path
 import subprocess
 import sys
+import tempfile
 import time
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from crgame_ros.launcher.interruption import writing
 from crgame_ros.launcher.run_report import write_run_report
@@ -39,7 +40,8 @@ class Finisher:
         self._reports = reports
         self._finished: list[FinishedRecording] = []
         self._measured: dict[Path, Run | None] = {}
-        self._process: subprocess.Popen[str] | None = None
+        # The process that finishes a run, and what it says: a file never is full, as a pipe is.
+        self._process: tuple[subprocess.Popen[bytes], IO[str]] | None = None
         self._codes: dict[Path, int] = {}
         self._folder = session
         self._looked_s = 0.0
@@ -51,7 +53,7 @@ class Finisher:
             return
         self._looked_s = now_s
         if self._process is not None:
-            self._collect(self._process)
+            self._collect(*self._process)
             return
         folders = run_folders(self._session)
         left = [folder for folder in folders if folder not in self._codes]
@@ -68,13 +70,17 @@ class Finisher:
         # It takes a second to import.
         from crgame_ros.recording.finish import EMPTY, finish_run, OK
         if self._process is not None:
-            self._process.kill()
-            self._process.communicate()
+            process, said = self._process
+            with said:
+                process.kill()
+                process.wait()
+            self._process = None
         folders = run_folders(self._session)
         if not folders:
             self._say(f'error: {self._session} has been removed during the run: nothing is left')
         for folder in folders:
-            if folder not in self._codes:
+            # One that a signal ended, perhaps for want of memory, has a negative code.
+            if self._codes.get(folder, -1) < 0:
                 self._codes[folder] = finish_run(
                     folder, self._say,
                     finished=self._finished.append if self._reports else lambda _: None)
@@ -117,18 +123,21 @@ class Finisher:
     def _start(self, folder: Path) -> None:
         self._folder = folder
         # Ctrl-C is for the launcher, which then finishes all runs itself.
+        said = tempfile.TemporaryFile('w+')
         self._process = subprocess.Popen(
             [sys.executable, '-m', 'crgame_ros.launcher.finish_process', str(folder),
              *([] if self._reports else ['--no-report'])],
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-            text=True, start_new_session=True)
+            stdin=subprocess.DEVNULL, stdout=said, stderr=subprocess.STDOUT,
+            start_new_session=True), said
 
-    def _collect(self, process: subprocess.Popen[str]) -> None:
+    def _collect(self, process: subprocess.Popen[bytes], said: IO[str]) -> None:
         code = process.poll()
         if code is None:
             return
-        for line in process.communicate()[0].splitlines():
-            self._say(line)
+        with said:
+            said.seek(0)
+            for line in said:
+                self._say(line.rstrip('\n'))
         self._codes[self._folder] = code
         self._process = None
 

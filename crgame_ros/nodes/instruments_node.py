@@ -165,7 +165,7 @@ class InstrumentsNode(Node):
         message = self._games.latest()
         if message is not None:
             self._begin(message.data)
-        while (message := self._objects.pop()) is not None:
+        for message in self._objects.waiting():
             self._world = WorldMessages(OBJECTS.read(message.data))
         self._follow_clock()
         self._read_cycles()
@@ -241,11 +241,11 @@ class InstrumentsNode(Node):
         self._publish_streams(always=True)
 
     def _follow_clock(self) -> None:
-        while (message := self._clocks.pop()) is not None:
+        for message in self._clocks.waiting():
             self._endpoints.diagnostics.now_ns = from_time(message.clock)
 
     def _read_cycles(self) -> None:
-        while (message := self._cycles.pop()) is not None:
+        for message in self._cycles.waiting():
             try:
                 table = CycleTable.from_message(message.layout.dim[1].label, message.data)
             except (InputError, IndexError) as error:
@@ -261,7 +261,7 @@ class InstrumentsNode(Node):
                 self._tell(self._markers.begun(self._streams.starts.newest))
 
     def _read_states(self) -> None:
-        while (message := self._states.pop()) is not None:
+        for message in self._states.waiting():
             if self._game is None or self._streams is None or self._world is None \
                     or not self._outlets:
                 continue
@@ -277,7 +277,7 @@ class InstrumentsNode(Node):
 
     def _read_markers(self) -> None:
         for slot, read in self._sources:
-            while (message := slot.pop()) is not None:
+            for message in slot.waiting():
                 try:
                     if self._markers is not None:
                         self._tell(read(self._markers, message.data))
@@ -285,7 +285,7 @@ class InstrumentsNode(Node):
                     self._endpoints.refusals.note(error.where, str(error))
         for slot, of in ((self._diagnostics, RunMarkers.of_study), *(
                 (each, RunMarkers.of_drivability) for each in self._drivability.values())):
-            while (message := slot.pop()) is not None:
+            for message in slot.waiting():
                 for status in map(read_status, message.status):
                     if self._markers is not None:
                         self._tell(of(self._markers, status))

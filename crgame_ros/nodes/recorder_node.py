@@ -188,8 +188,7 @@ class RecorderNode(Node):
         self._endpoints.diagnostics.publish(f'recorder_node: {subject}', level, text, values)
 
     def _write_waiting(self, recorded: RecordedTopic) -> None:
-        while (taken := recorded.slot.pop_timed()) is not None:
-            data, published_ns, received_ns = taken
+        for data, published_ns, received_ns in recorded.slot.waiting_timed():
             published_ns, received_ns = self._log_clock.times_ns(
                 published_ns, received_ns, time.time_ns(), time.monotonic_ns())
             if recorded.latched:
@@ -280,12 +279,13 @@ class RecorderNode(Node):
             self._endpoints.diagnostics.now_ns = offset_ns
             self._subscribe(tuple(item.id for item in game.humans),
                             tuple(item.id for item in game.avs))
+            # Set before, too: a bag that cannot be made is not tried again with each clock.
+            self._closed = None
             self._writer = BagWriter(self._folder_of(game, again), now_ns=time.monotonic_ns)
             # This node may come after the end; a recording may also be played again.
             over = self._run == self._ended_run and not again
             self._offset_ns, self._ended_s = offset_ns, time.monotonic() if over else None
             self._time = RunTime()
-            self._closed = None
             self._recorded.clear()
             self._begun_s = time.monotonic()
             for recorded in self._topics.values():

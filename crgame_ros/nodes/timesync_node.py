@@ -53,7 +53,7 @@ class TimesyncNode(Node):
         message = self._games.latest()
         if message is not None:
             self._begin(message.data)
-        while (message := self._cycles.pop()) is not None:
+        for message in self._cycles.waiting():
             try:
                 self._add(CycleTable.from_message(message.layout.dim[1].label, message.data))
             except InputError as error:

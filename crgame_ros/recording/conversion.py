@@ -149,6 +149,6 @@ def _check_road(road: Path | None) -> None:
 
 def day_of(bag: Path) -> date | None:
     """Return the day on which a recording began, in UTC; None for that of an offline run."""
-    with BagReader(bag) as reader:
+    with BagReader(bag, parts=True) as reader:
         return None if reader.has_virtual_clock else datetime.fromtimestamp(
             reader.start_ns * 1e-9, UTC).date()

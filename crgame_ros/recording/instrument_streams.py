@@ -105,7 +105,10 @@ def read_streams(path: Path, epoch: int | None = None) -> tuple[RecordedStream, 
         lists = _lists(reader)
         batches: dict[tuple[str, ...], list[_Batch]] = defaultdict(list)
         for stream, batch in _batches(reader, lists):
-            batches[_key(stream)].append(batch)
+            last = lists.last(_key(stream))
+            # Of one that came back with other channels, only the samples of these are one table.
+            if (stream.channels, _has_texts(stream)) == (last.channels, _has_texts(last)):
+                batches[_key(stream)].append(batch)
     found = []
     names = [key[0] for key in batches]
     for key, parts in batches.items():
@@ -117,6 +120,10 @@ def read_streams(path: Path, epoch: int | None = None) -> tuple[RecordedStream, 
 
 def _key(stream: InstrumentStream) -> tuple[str, ...]:
     return stream.name, stream.type, stream.source_id, stream.host
+
+
+def _has_texts(stream: InstrumentStream) -> bool:
+    return stream.format == 'string'
 
 
 def _clock(reader: BagReader, epoch: int) -> tuple[FloatArray, float, float]:
@@ -169,7 +176,8 @@ def _batches(reader: BagReader, lists: _Lists) -> Iterator[tuple[InstrumentStrea
             reader.foreign[topic] += 1
             continue
         stream = lists.of(number, log_ns)
-        if stream is not None and width == len(stream.channels):
+        if stream is not None and width == len(stream.channels) \
+                and _has_texts(stream) == (topic == TEXTS.topic):
             yield stream, batch
 
 

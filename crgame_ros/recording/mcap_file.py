@@ -215,16 +215,18 @@ class McapFile:
             defined = 0 < opcode <= _LAST_DEFINED_OPCODE or opcode >= _FIRST_PRIVATE_OPCODE
             if end > self.size or not defined:
                 break
-            if opcode == Opcode.MESSAGE:
-                channel, _, log_time_ns, _ = _MESSAGE.unpack(stream.read(_MESSAGE.size))
-                self._index.count_outside(channel)
-                self._extend_run(run, position, end, min(log_time_ns, _LATEST_NS))
-            else:
-                self._close_run(run)
-                try:
+            try:
+                if opcode == Opcode.MESSAGE:
+                    channel, _, log_time_ns, _ = _MESSAGE.unpack(stream.read(
+                        min(_MESSAGE.size, length)))
+                    self._index.count_outside(channel)
+                    self._extend_run(run, position, end, min(log_time_ns, _LATEST_NS))
+                else:
+                    self._close_run(run)
                     self._read_record(stream, opcode, position, end)
-                except _DAMAGES:
-                    self.useless_bytes += end - position
+            except _DAMAGES:
+                self._close_run(run)
+                self.useless_bytes += end - position
             stream.seek(end)
             position = end
             if opcode == Opcode.FOOTER:

@@ -45,7 +45,7 @@ def read_game_document(bag: Path) -> GameDocument:
 
     :raises InputError: if a document of the run is missing.
     """
-    with BagReader(bag) as reader:
+    with BagReader(bag, parts=True) as reader:
         return read_epoch(reader).game
 
 
@@ -58,7 +58,7 @@ def read_recorded_game(bag: Path, *, other_planners: bool = False) -> RecordedGa
     :raises InputError: if it is not in the recording, or names code outside this package: only the
         user may choose code to execute, not a file of unknown origin.
     """
-    with BagReader(bag) as reader:
+    with BagReader(bag, parts=True) as reader:
         run = read_epoch(reader)
     where = f'{bag}, {GAME.topic}'
     text = run.game.file

@@ -284,6 +284,8 @@ def lost_intervals(table: CycleTable, timing: TimingSpec, dt_s: float,
     """
     if timing.clip != 'carry' or not timing.measured_interval:
         return None
+    # Rows of other programs may have any n: no array is longer than the run.
+    table = CycleTable(table.columns, table.rows[table.column('n') >= 0.0])
     # The run begins without a lag.
     ns = np.concatenate(([0], table.column('n').astype(np.int64)))
     lags_s = np.concatenate(([0.0], table.column('cumulative_error_s')))
@@ -295,15 +297,15 @@ def lost_intervals(table: CycleTable, timing: TimingSpec, dt_s: float,
     if not len(misfits_s) or np.median(misfits_s) > _ROUNDING_S:
         return None
     found = np.full(last_n + 1, dt_s)
-    recorded = np.zeros(max(last_n, int(ns[-1])) + 1, dtype=bool)
-    recorded[ns] = True
+    recorded = np.zeros(last_n + 1, dtype=bool)
+    recorded[ns[ns <= last_n]] = True
     sums_s = np.cumsum(moved_s)
     anchors = np.flatnonzero(free)
     lost = np.diff(ns[anchors]) - np.diff(anchors)
     for gap in np.flatnonzero(lost):
         left, right = anchors[gap], anchors[gap + 1]
         total_s = (ns[right] - ns[left]) * dt_s + lags_s[right] - lags_s[left]
-        place = np.arange(ns[left] + 1, ns[right])
-        place = place[~recorded[place] & (place <= last_n)]
+        place = np.arange(ns[left] + 1, min(ns[right], last_n + 1))
+        place = place[~recorded[place]]
         found[place] = max(0.0, (total_s - (sums_s[right] - sums_s[left])) / lost[gap])
     return found

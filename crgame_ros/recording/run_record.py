@@ -15,9 +15,9 @@ from crgame_ros.game.documents import VEHICLE_ID
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.seat_documents import DRIVERS, DrivingSpell, ORDER
 from crgame_ros.game.task_documents import TASK_LOG, TaskEntry
-from crgame_ros.messages.cdr import header_stamp_ns
+from crgame_ros.messages.cdr import header_stamp_ns, stamp_of
 from crgame_ros.messages.joints import VEHICLES_TOPIC
-from crgame_ros.messages.status_values import read_status
+from crgame_ros.messages.status_values import read_status, status_amount
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recorded_game import read_run_events
@@ -133,20 +133,23 @@ def read_drivers(path: Path, epoch: int | None = None) -> tuple[RecordedDriver, 
         topic = reader.topics.get(DRIVERS.topic)
         if topic is None or not topic.message_count:
             return ()
-        wanted = read_epoch(reader, epoch).game.epoch
+        run = read_epoch(reader, epoch)
         spells: tuple[DrivingSpell, ...] = ()
         # By seat, person and name of the value.
         delays_ms: dict[tuple[str, str, str], list[float]] = defaultdict(list)
-        for message in reader.messages([DRIVERS.topic, _DIAGNOSTICS]):
-            content = reader.decode(message).message
+        for message in reader.readable([DRIVERS.topic, _DIAGNOSTICS]):
+            content = message.message
             if message.topic == DRIVERS.topic:
-                spells = _newer(spells, str(content.data), wanted)
-            else:
+                spells = _newer(spells, str(content.data), run.game.epoch)
+            elif run.holds(stamp_of(content), message.log_time_ns):
                 for status in map(read_status, content.status):
                     if found := _DRIVER.fullmatch(status.name):
                         for name in _DELAYS:
-                            _note(delays_ms[found[1], status.values.get('person', ''), name],
-                                  status.values.get(name, ''))
+                            delay_ms = status_amount(status.values, name)
+                            # It may not be measured yet.
+                            if delay_ms is not None:
+                                delays_ms[found[1], status.values.get('person', ''),
+                                          name].append(delay_ms)
     return tuple(RecordedDriver(item, *(_median(delays_ms.get(
         (item.seat, '' if item.person is None else item.person.id, name)))
         for name in _DELAYS)) for item in spells)
@@ -161,14 +164,6 @@ def _newer(spells: tuple[DrivingSpell, ...], text: str,
         # The message may come from a foreign publisher.
         return spells
     return newer.drivers if newer.epoch == wanted else spells
-
-
-def _note(delays_ms: list[float], text: str) -> None:
-    try:
-        delays_ms.append(float(text))
-    except ValueError:
-        # Not measured yet.
-        return
 
 
 def _median(values: list[float] | None) -> float | None:

@@ -14,7 +14,7 @@ from crgame_ros.game.documents import EVENTS
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.joints import OBJECT_STATES_TOPIC, vehicles_from_joints, VEHICLES_TOPIC
-from crgame_ros.messages.status_values import BRAKING, read_status
+from crgame_ros.messages.status_values import BRAKING, read_status, status_amount
 from crgame_ros.planner.adapter import first_of_kind
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.reader import BagReader
@@ -287,14 +287,16 @@ class _Collector:
         self._statuses[status.name] = values
         self.sound.add(told)
         self.view.add(told, (stamp_ns - self._run.game.scheduler.clock_offset_ns) * 1e-9)
-        if status.name.startswith('planner_node: ') and values.get('plan_time_ms'):
-            self._plan_times_ms[status.name].append(float(values['plan_time_ms']))
+        # Anybody may publish statuses: what is no number is skipped.
+        plan_time_ms, age_ms = (status_amount(values, key) for key in ('plan_time_ms', 'age_ms'))
+        if status.name.startswith('planner_node: ') and plan_time_ms is not None:
+            self._plan_times_ms[status.name].append(plan_time_ms)
             if status.message.startswith(BRAKING):
                 reason = first_of_kind(self._first_reasons[status.name],
                                        status.message.removeprefix(BRAKING))
                 self._reasons[status.name][reason] += 1
-        elif status.name.startswith('sim_node: ') and values.get('age_ms'):
-            self._ages_ms[status.name].append(float(values['age_ms']))
+        elif status.name.startswith('sim_node: ') and age_ms is not None:
+            self._ages_ms[status.name].append(age_ms)
 
     def _add_verdict(self, vehicle: str, status: Any) -> None:
         """Store new violations; repeated statuses contain those that last."""
@@ -326,13 +328,14 @@ class _Collector:
             first_latency_ms=self._first_latency_ms.get(av),
             age_ms=spread_of(self._ages_ms[f'sim_node: {av} plans']),
             worst_tracking_errors={
-                key.removeprefix(_WORST).removesuffix('_error'): float(value)
-                for key, value in engine.items() if key.startswith(_WORST) and value} or None)
+                key.removeprefix(_WORST).removesuffix('_error'): value
+                for key in engine if key.startswith(_WORST)
+                and (value := status_amount(engine, key)) is not None} or None)
 
 
 def _count(values: dict[str, str], key: str) -> int | None:
-    text = values.get(key, '')
-    return int(text) if text.isdecimal() else None
+    amount = status_amount(values, key)
+    return None if amount is None else int(amount)
 
 
 def offline_outcome(result: OfflineResult) -> RunReport:

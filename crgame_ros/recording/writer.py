@@ -153,7 +153,8 @@ class BagWriter:
         if self._closed or log_time_ns < 0:
             raise ValueError('the writer is closed' if self._closed else 'negative time')
         sequence = self._counts[channel]
-        sent_ns = log_time_ns if publish_time_ns is None else publish_time_ns
+        # The clock of the sender may be wrong, and the file has no negative times.
+        sent_ns = log_time_ns if publish_time_ns is None else max(0, publish_time_ns)
         if self.message_count == 0:
             self._start_ns = self._end_ns = log_time_ns
         self._start_ns = min(self._start_ns, log_time_ns)

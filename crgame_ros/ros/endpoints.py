@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Publishers, subscriptions, services and actions, created from the interface contract."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 import ctypes
 from functools import cache
 import time
@@ -131,10 +131,23 @@ class PolledSubscription(Generic[T]):
         data, info = taken
         return data, int(info['source_timestamp']), int(info['received_timestamp'])
 
+    def waiting(self) -> Iterator[T]:
+        """Remove and yield the waiting messages; those that come meanwhile may have to wait."""
+        return (message for message, _, _ in self.waiting_timed())
+
+    def waiting_timed(self) -> Iterator[tuple[T, int, int]]:
+        """Yield what `waiting` does, with the times of publication and reception."""
+        # More than the queue holds come only where somebody publishes faster than they are read.
+        for _ in range(self.subscription.qos_profile.depth):
+            taken = self.pop_timed()
+            if taken is None:
+                return
+            yield taken
+
     def latest(self) -> T | None:
         """Remove all waiting messages and return the newest, None if there is none."""
         newest = None
-        while (message := self.pop()) is not None:
+        for message in self.waiting():
             newest = message
         return newest
 

@@ -39,7 +39,7 @@ class HeardTopics:
         return wanted - self._names
 
     def _listen(self) -> None:
-        while (message := self._slot.pop()) is not None:
+        for message in self._slot.waiting():
             for status in message.status:
                 values = read_status(status).values
                 if status.name == f'recorder_node: {RECORDED}' \

@@ -116,7 +116,7 @@ class WorldFollower:
                 yield step
 
     def _receive_states(self) -> None:
-        while (message := self._states.pop()) is not None:
+        for message in self._states.waiting():
             course = self._time.follow(_stamp_ns(message))
             if course is TimeCourse.AHEAD:
                 self._ahead.append(message)
@@ -136,7 +136,7 @@ class WorldFollower:
 
     def _receive_objects(self, scenario: ScenarioSet) -> None:
         scheduler = scenario.game.scheduler
-        while (message := self._objects.pop()) is not None:
+        for message in self._objects.waiting():
             n = scheduler.tick_of_stamp(from_time(message.header.stamp))
             if n is None:
                 continue

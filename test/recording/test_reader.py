@@ -306,6 +306,14 @@ def test_zeros_at_the_end_are_no_messages(tmp_path: Path, samples: Any) -> None:
         assert (reader.complete, list(reader.messages())) == (False, [])
 
 
+def test_a_message_too_short_for_its_head_is_damage(tmp_path: Path) -> None:
+    """It is left out, as other damaged records are."""
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(b'\x89MCAP0\r\n\x05' + bytes(8))
+    with BagReader(path) as reader:
+        assert not reader.complete and reader.message_count == 0
+
+
 def test_damage_inside_is_named(tmp_path: Path, samples: Any) -> None:
     """A flipped bit fails the checksum; the message says where."""
     record_ours(tmp_path / 'run', samples)

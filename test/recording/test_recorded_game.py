@@ -16,7 +16,12 @@ from crgame_ros.game.game import AvSpec, Game, HumanSpec, load_game, ModelSpec, 
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup, plan_run
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.recorded_game import read_recorded_game, recorded_inputs
+from crgame_ros.recording.conversion import day_of
+from crgame_ros.recording.recorded_game import (
+    read_game_document,
+    read_recorded_game,
+    recorded_inputs,
+)
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np
@@ -88,6 +93,18 @@ def test_all_in_the_recording_drive_again(record: Any,
     again = read_recorded_game(bag).game
     assert [human.driver for human in again.humans] == [f'replay:{bag}'] * 2
     assert (again.seed, again.avs, again.title) == (game.seed, original.setup.game.avs, game.title)
+
+
+def test_the_run_may_be_in_a_later_part(record: Any, tmp_path: Path) -> None:
+    """A recorder that was killed at once, and the one that was started again."""
+    bag, original = record(Game(CUT_IN_XML, humans=(HumanSpec('hv0', 'idle'),), duration=1.5))
+    begun = day_of(bag)
+    bag.rename(tmp_path / 'bag_part2')
+    bag.mkdir()
+    (bag / 'bag_0.mcap').touch()
+    assert read_game_document(bag).benchmark_id == original.setup.loaded.benchmark_id
+    assert read_recorded_game(bag).loaded.sha256 == original.setup.loaded.sha256
+    assert day_of(bag) == begun
 
 
 def test_live_run_gets_the_scenario_as_a_file(record: Any, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.run_tables import tables_of
+from crgame_ros.messages.instrument_samples import InstrumentStream, InstrumentStreams, STREAMS
 from crgame_ros.recording.instrument_streams import read_streams
 from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
@@ -81,7 +82,7 @@ def test_a_sample_belongs_to_one_run(recorder: Any, result: OfflineResult, tmp_p
 
 def test_what_is_no_sample_is_left_out(recorder: Any, samples: Any, result: OfflineResult,
                                        bag: Path, tmp_path: Path) -> None:
-    """Anybody may publish: text that is no JSON, other columns, a stream that is not listed."""
+    """Text that is no JSON, other columns, a stream that is not listed, or other channels."""
     string, numbers = 'std_msgs/msg/String', 'std_msgs/msg/Float64MultiArray'
     columns = 'stream,connection,sent_s,offset_s,uncertainty_s,received_s,a'
     foreign = [
@@ -90,7 +91,13 @@ def test_what_is_no_sample_is_left_out(recorder: Any, samples: Any, result: Offl
         ('/instruments/samples', numbers, LOG_NS, recorder.cycle_rows(['a'], np.ones((1, 1)))),
         *(('/instruments/samples', numbers, LOG_NS, recorder.cycle_rows(
             columns.split(','), np.array([[number, 0.0, 1.0, 0.0, 0.0, 1.0, 5.0]])))
-          for number in (1, 7, 0.5))]
+          for number in (1, 2, 7, 0.5)),
+        # A device that was there with other channels before.
+        ('/instruments/streams', string, LOG_NS - 5_000_000_000, samples.string(STREAMS.write(
+            InstrumentStreams((InstrumentStream(
+                1, 'Heart', 'ECG', ('lead',), ('mV',), 50.0, 'float32', 'amplifier', 'lab'),))))),
+        ('/instruments/samples', numbers, LOG_NS - 4_000_000_000, recorder.cycle_rows(
+            columns.split(','), np.array([[1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 5.0]])))]
     spoilt = recorder.ours(tmp_path / 'bag', [
         *recorder.messages(result), *foreign, *recorder.instruments()])
     for found, expected in zip(read_streams(spoilt), read_streams(bag), strict=True):

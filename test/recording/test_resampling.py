@@ -14,10 +14,11 @@ from crgame_ros.game.game import AvSpec, Game, HumanSpec, LaneletSpawn, load_gam
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.conversion import convert
 from crgame_ros.recording.export import write_scenario
-from crgame_ros.recording.resampling import resample
+from crgame_ros.recording.resampling import lost_intervals, resample
 from crgame_ros.recording.run_trajectories import RunTrajectories, trajectories_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
+from crgame_ros.timing.cycle_rows import CycleTable, TIMING_COLUMNS
 from crgame_ros.timing.time_controller import TimeController
 import numpy as np
 from numpy.typing import NDArray
@@ -161,6 +162,19 @@ def test_missing_intervals_are_told(tmp_path: Path, recorder: Any, notice: str,
     report = convert(recorder.ours(tmp_path / 'bag', kept))
     assert len(report.notices) == 1 and notice in report.notices[0]
     assert report.time_steps == 31
+
+
+def test_a_forged_cycle_is_no_longer_than_the_run() -> None:
+    """Anybody may publish a row, of any n."""
+    ns = np.array([-10.0 ** 12, *np.arange(1.0, 21.0), *np.arange(24.0, 31.0), 10.0 ** 12])
+    rows = np.zeros((len(ns), len(TIMING_COLUMNS)))
+    rows[:, TIMING_COLUMNS.index('n')] = ns
+    rows[:, TIMING_COLUMNS.index('dt_eff_s')] = DT
+    # The three lost intervals are 20 ms each.
+    rows[ns > 20.0, TIMING_COLUMNS.index('cumulative_error_s')] = 0.03
+    found = lost_intervals(CycleTable(TIMING_COLUMNS, rows), TimingSpec(), DT, 30)
+    assert found is not None and found[21:24] == pytest.approx(0.02)
+    assert len(found) == 31 and np.delete(found, [21, 22, 23]) == pytest.approx(DT)
 
 
 def test_an_av_taken_over_moves_by_its_own_intervals() -> None:

@@ -9,9 +9,10 @@ from typing import Any
 from crgame_ros.analysis.scores.scored_drives import score_drives
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.game import load_game
+from crgame_ros.game.seat_documents import DRIVERS, DrivingSpell, DrivingSpells
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_game import recorded_inputs
-from crgame_ros.recording.run_record import read_run_record, run_record_of
+from crgame_ros.recording.run_record import read_drivers, read_run_record, run_record_of
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np
@@ -55,3 +56,26 @@ def test_a_vehicle_put_back_before_the_log_begins_does_not_jump_in_it() -> None:
     assert scores[0].remarks == score_drives(log)[0].remarks
     row, = late.jumps(0)
     assert 2.0 <= 0.1 * int(log.ks[row]) <= 2.1
+
+
+def test_delays_of_drivers_are_their_runs(recorder: Any, samples: Any, tmp_path: Path) -> None:
+    """The median of what was measured in a run; what others say besides is skipped."""
+    setup = build_setup(load_game(scenarios_directory() / 'cut_in.yaml'))
+    result = run_offline(setup, duration_s=0.1)
+    start_ns, name, kind = 1_700_000_000_000_000_000, 'driver_node: hv0 driver', \
+        'diagnostic_msgs/msg/DiagnosticArray'
+    messages = []
+    for epoch, delays_ms in enumerate((('40', '', '50', 'nan', 'inf'), ('7.5',))):
+        offset_ns = epoch * 5_000_000_000
+        log_ns = start_ns + offset_ns
+        messages += recorder.messages(result, epoch=epoch, offset_ns=offset_ns, log_ns=log_ns)
+        messages += [('/diagnostics', kind, log_ns + 200_000_000, recorder.status(
+            offset_ns + 100_000_000, name, '', input_delay_ms=text)) for text in delays_ms]
+        messages += [('/diagnostics', kind, log_ns + 200_000_000, bytes(20)),
+                     ('/seats/drivers', 'std_msgs/msg/String', log_ns + 200_000_000,
+                      samples.string(DRIVERS.write(DrivingSpells(epoch, (
+                          DrivingSpell('hv0', 'device', 'keyboard', None, 0),)))))]
+    bag = recorder.ours(tmp_path / 'bag', messages)
+    for epoch, median_ms in enumerate((45.0, 7.5)):
+        driver, = read_drivers(bag, epoch)
+        assert (driver.input_delay_ms, driver.round_trip_ms) == (median_ms, None)

@@ -8,6 +8,7 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
+import time
 from typing import Any
 
 from crgame_ros.analysis.scores.solution_judge import SolutionJudge
@@ -121,6 +122,26 @@ def test_a_wanted_end_before_the_start_is_no_failure(tmp_path: Path) -> None:
     """Ctrl-C may come while a run waits for its driver; without it a run records something."""
     assert Finisher(tmp_path, lambda _: None).finish_all(asked_to_end=True) == 0
     assert Finisher(tmp_path, lambda _: None).finish_all() == 1
+
+
+def test_a_process_that_was_killed_leaves_its_run_to_the_end(
+        session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It may have said more than a pipe holds."""
+    program = session.parent / 'killed.sh'
+    program.write_text('#!/bin/sh\nhead -c 200000 /dev/zero | tr "\\0" x\nkill -9 $$\n')
+    program.chmod(0o700)
+    said: list[str] = []
+    finisher = Finisher(session, said.append, reports=False)
+    with monkeypatch.context() as patched:
+        patched.setattr(sys, 'executable', str(program))
+        until_s = time.monotonic() + 20.0
+        while not said:
+            assert time.monotonic() < until_s
+            finisher.poll()
+            time.sleep(0.05)
+    assert said == ['x' * 200_000]
+    assert finisher.finish_all() == 0
+    assert (session / 'timing.json').exists()
 
 
 def test_without_report_there_is_none(session: Path) -> None:

@@ -135,6 +135,12 @@ def test_planners(tmp_path: Path, recorder: Any, drive: Drive) -> None:
             stamp_ns, 'planner_node: av0',
             'planning' if plans == 10 else f'braking: {plans} m short', k=plans, plans=plans,
             fallbacks=fallbacks, plan_time_ms=f'{time_ms:.3f}')))
+    # Another program's statuses by the same names.
+    for text in ('x', 'nan', 'inf', '-1', '9' * 5000):
+        messages += [('/diagnostics', DIAGNOSTICS, START + 90_000_000, recorder.status(
+            90_000_000, name, '', **{value: text})) for name, value in (
+                ('planner_node: av0', 'plan_time_ms'), ('sim_node: av0 plans', 'age_ms'),
+                ('sim_node: av1 plans', 'worst_lane_error'), ('planner_node: av1', 'plans'))]
     report = timing_report(recorder.ours(
         tmp_path / 'bag', sorted(messages, key=lambda message: message[2])))
     av0 = report['planners']['av0']

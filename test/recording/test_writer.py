@@ -151,10 +151,12 @@ def test_chosen_publish_time_is_kept(tmp_path: Path, samples: Any) -> None:
         channel = writer.add_topic('/clock', 'rosgraph_msgs/msg/Clock', STREAM)
         for i in range(3):
             writer.write(channel, samples.clock(i), 100 + i, 90 + i)
+        # As of a sender whose clock stands before 1970.
+        writer.write(channel, samples.clock(3), 103, -5)
     with writer.path.open('rb') as stream:
         found = [(m.sequence, m.log_time, m.publish_time)
                  for _, _, m in make_reader(stream).iter_messages()]
-    assert found == [(0, 100, 90), (1, 101, 91), (2, 102, 92)]
+    assert found == [(0, 100, 90), (1, 101, 91), (2, 102, 92), (3, 103, 0)]
 
 
 def test_everything_older_than_a_second_is_on_disk(tmp_path: Path, samples: Any) -> None:

@@ -69,3 +69,6 @@ def test_no_expression_takes_long() -> None:
     for pattern in ('((a{255}){255}){255}', 'a{255}b{255}', '(' * 70 + 'a' + '+)' * 70):
         with pytest.raises(InputError, match='is too long|has more than'):
             NamePattern(pattern)
+    # Repetitions of nothing add no nodes, and are not written out.
+    found = NamePattern('(a{0}){255}' + '{255}' * 3 + 'b')
+    assert found.matches('b') and not found.matches('ab')

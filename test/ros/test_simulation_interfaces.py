@@ -184,7 +184,9 @@ def test_entities_are_told_by_what_passes_the_filters(desk: Desk, simulation: Si
         ({'categories': [kinds(category=kinds.CATEGORY_ROBOT)], 'filter': '[^h].*'}, ['av0']),
         ({'categories': [kinds(category=kinds.CATEGORY_OBJECT)]}, []),
         ({'tags': msg.TagsFilter(tags=['car', 'pedestrian'])}, everybody),
-        ({'tags': msg.TagsFilter(tags=['car', 'recorded'], filter_mode=1)}, ['o200'])]
+        ({'tags': msg.TagsFilter(tags=['car', 'recorded'], filter_mode=1)}, ['o200']),
+        # Nothing is left of which a volume could be asked.
+        ({'filter': 'o', 'bounds': msg.Bounds(type=1, points=[Vector3(), Vector3()])}, [])]
     cases += [({'bounds': msg.Bounds(type=kind, points=[Vector3(x=a, y=b, z=c)
                                                         for a, b, c in points])}, expected)
               for kind, points, expected in (

@@ -37,3 +37,23 @@ def test_a_prompt_node_runs_callbacks_and_leaves_polled_messages_alone() -> None
         node.destroy_subscription(kept)
     node.destroy_node()
     rclpy.try_shutdown()
+
+
+def test_a_flood_does_not_hold_up_who_reads_it() -> None:
+    """What comes while the waiting messages are read is read the next time."""
+    depth = 3
+    with Peer(own_domain_id()) as reader:
+        polled = Endpoints(reader.node).polled('/trigger', depth=depth)
+        publisher = reader.publisher('/trigger')
+
+        def send(text: str) -> None:
+            publisher.publish(String(data=text))
+            assert publisher.wait_for_all_acked()
+
+        send('0')
+        read: list[str] = []
+        for message in polled.waiting():
+            read.append(message.data)
+            send(str(len(read)))
+            assert len(read) <= depth
+        assert read == ['0', '1', '2'] and polled.latest().data == '3'

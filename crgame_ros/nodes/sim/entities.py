@@ -180,7 +180,7 @@ class Entities:
                     and (not categories or category(item) in categories) \
                     and (not tagged or (all if all_tags else any)(tag in has for tag in tagged)):
                 found.append(place)
-        return found if region is None else list(self._overlapping(found, region))
+        return found if region is None or not found else list(self._overlapping(found, region))
 
     def _overlapping(self, places: list[int], region: Region) -> Iterator[int]:
         reaches = np.array([region.reach(self.descriptions[place].height) for place in places])

@@ -173,7 +173,7 @@ class SimInputs:
     def stop_request(self) -> tuple[str, str] | None:
         """Return (vehicle, n) of a violation that asks for a stop, None if there is none."""
         for vehicle_id, slot in self._drivability.items():
-            while (message := slot.pop()) is not None:
+            for message in slot.waiting():
                 if from_time(message.header.stamp) < self._clock_offset_ns:
                     # A verdict on the run before the reset.
                     continue

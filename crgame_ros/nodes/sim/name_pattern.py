@@ -192,7 +192,10 @@ def _repeat(part: _Part, least: int, most: int | None) -> _Part:
         for _ in range(0 if most is None else most - least):
             then = program.add((part(program, then), then))
         for _ in range(least):
-            then = part(program, then)
+            before, then = then, part(program, then)
+            if then == before:
+                # It consumes nothing, however often it is repeated.
+                break
         return then
     return build
 
