@@ -30,6 +30,8 @@ FloatArray = NDArray[np.float64]
 # Poses and velocities of so many objects times time steps take 240 MB; the largest published
 # scenario has 15,300, a run of an hour with 100 objects 3.6 million.
 _MAX_CELLS = 5_000_000
+# Each is placed at each of the obstacle's states: a small file could ask for hours of that.
+_MAX_SHAPES = 100
 _SWITCHES = {'indicator_left': Light.LEFT, 'indicator_right': Light.RIGHT, 'horn': Light.HORN,
              'braking_lights': Light.BRAKE, 'flashing_blue_lights': Light.BLUE,
              'hazard_warning_lights': Light(HAZARD)}
@@ -262,6 +264,9 @@ def _parts(obstacle: Obstacle, source: str) -> Iterator[_Part]:
     kind = getattr(obstacle, 'obstacle_type', None)
     name = 'unknown' if kind is None else str(kind.value)
     shapes = list(parts_of(shape))
+    if len(shapes) > _MAX_SHAPES:
+        raise InputError(f'has {len(shapes)} shapes, more than {_MAX_SHAPES}', where,
+                         'make several obstacles of it')
     middle = exact_position(shape) if len(shapes) > 1 else None
     for index, part in enumerate(shapes):
         if isinstance(obstacle, PhantomObstacle) and isinstance(part, Rectangle):

@@ -70,6 +70,14 @@ def test_too_many_cells_are_refused_before_they_are_allocated() -> None:
         ScenarioObstacles(loaded)
 
 
+def test_an_obstacle_of_very_many_shapes_is_refused() -> None:
+    """Each of its states would be computed for each of them."""
+    one, shape = dynamic(state('initialState', 0, 5.0)), RECTANGLE.format(center='')
+    assert len(obstacles(one.replace(shape, shape * 100)).ids) == 100
+    with pytest.raises(InputError, match='x, obstacle 7: has 101 shapes, more than 100'):
+        obstacles(one.replace(shape, shape * 101))
+
+
 @pytest.mark.matrix('USA_US101-4_1_T-1.xml', 'OSC_PedestrianCollision-1_1_T-1.xml')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', [
