@@ -216,7 +216,7 @@ def test_recordings_are_those_of_the_first_and_go_with_any_of_them(tmp_path: Pat
     assert held == ['participants/P01/runs/1', 'participants/P02']
 
 
-def test_who_did_nothing_has_not_left_the_road(tmp_path: Path) -> None:
+def test_who_did_nothing_has_not_left_the_road() -> None:
     """The violation of one ends the drive of all."""
     status = RunStatus()
     status.begin(('hv0', 'hv1', 'hv2'))
