@@ -86,7 +86,7 @@ def replay(values: argparse.Namespace) -> int:
         found.append(alternative.as_dict())
         # Written after each, so that a failure loses none of the others.
         (folder / 'comparison.json').write_text(
-            json.dumps(found, indent=2) + '\n', encoding='utf-8')
+            json.dumps(found, indent=2, allow_nan=False) + '\n', encoding='utf-8')
     # Free the planners' reference cycles, which compiled packages would report as leaks at the
     # end.
     gc.collect()
