@@ -85,7 +85,8 @@ def replay(values: argparse.Namespace) -> int:
                                 f'{alternative.planner}: ', scores))
         found.append(alternative.as_dict())
         # Written after each, so that a failure loses none of the others.
-        write_text(json.dumps(found, indent=2) + '\n', folder / 'comparison.json')
+        write_text(json.dumps(found, indent=2, allow_nan=False) + '\n',
+                   folder / 'comparison.json')
     # Free the planners' reference cycles, which compiled packages would report as leaks at the
     # end.
     gc.collect()

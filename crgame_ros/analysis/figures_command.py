@@ -82,6 +82,9 @@ def figures(values: argparse.Namespace) -> int:
     runs = [Run.of_recording(path, values.epoch, name=label, progress=Progress(say).tell)
             for path, label in zip(
                 values.runs, values.label or [''] * len(values.runs), strict=True)]
+    for run, path in zip(runs, values.runs, strict=True):
+        if not run.vehicles and (values.video or {'frames', 'profiles'} & set(wanted)):
+            raise InputError('has no driven vehicle to draw', str(path), 'name another run')
     first = values.runs[0]
     # A recording is in the folder of its run.
     folder = values.out or (first if recording_in(first) != first else first.parent) / FOLDER

@@ -25,7 +25,7 @@ the time it spent below a threshold, whose way it crossed, and the traffic rules
 Then how people drove: lane keeping, steering reversals, pedals, reactions to events, gaps
 accepted, take-overs.
 
-Distances are bumper to bumper along the vehicle's own lane. docs/criticality.md, docs/testing.md
+Distances are bumper to bumper along the vehicle's own lane. docs/criticality.md, docs/scores.md
 and docs/behaviour.md define each.
 
   crgame measure runs/NAME
@@ -66,7 +66,7 @@ def measure(values: argparse.Namespace) -> int:
     found = measure_run(record, thresholds, values.request, Progress(say, f'measuring {path}'),
                         Progress(say, f'measuring the drivers of {path}'))
     if values.json:
-        print(json.dumps(found.as_dict(), indent=2))
+        print(json.dumps(found.as_dict(), indent=2, allow_nan=False))
     else:
         lines = [*_lines(found),
                  *(line for each in found.behaviour if each.human or each.take_overs
@@ -128,7 +128,8 @@ def replay_rows(found: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, ...]]
     for each in found:
         for vehicle_id, vehicle in each['criticality']['vehicles'].items():
             worst = {name: f'{entry["value"]:.2f}' for name, entry in vehicle['worst'].items()
-                     if MEASURES[name].matters(entry['value'])}
+                     if entry['value'] is not None
+                     and MEASURES[name].matters(entry['value'])}
             touched = [item for item in each.get('contacts') or ()
                        if vehicle_id in (item['vehicle'], item['with'])]
             yield (

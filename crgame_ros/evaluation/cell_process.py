@@ -256,6 +256,7 @@ def main() -> NoReturn:
     for text in _messages():
         with suppress(OSError):
             os.ftruncate(2, 0)
+            os.lseek(2, 0, os.SEEK_SET)
         try:
             rows = compute_cell(cell_of(text), contents)
         except MemoryError:

@@ -9,7 +9,7 @@ from functools import partial
 import json
 from pathlib import Path
 import sys
-from typing import get_args, TYPE_CHECKING
+from typing import Any, get_args, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.file_names import GRID_FILE, REPORTS, SEARCH_FILE
@@ -207,7 +207,7 @@ def _from_here(key: str, name: str) -> str:
 
 def _given(values: argparse.Namespace) -> dict[str, object]:
     """Return the values of a plan that the command line gives."""
-    given: dict[str, object] = {
+    given: dict[str, Any] = {
         name: getattr(values, name) for name in ('games', 'scenarios', 'humans')
         if getattr(values, name)}
     if values.games:
@@ -223,6 +223,8 @@ def _given(values: argparse.Namespace) -> dict[str, object]:
         if files:
             given[name] = {Path(file).stem: file if file == 'own' else
                            str(expanded(file).resolve()) for file in files}
+            if len(given[name]) < len(files):
+                raise InputError('two files have one name', f'--{name}', 'rename one of them')
     variants = {name: value for name, value in (
         ('number', values.variants), ('sampling', values.sampling)) if value is not None}
     if variants:

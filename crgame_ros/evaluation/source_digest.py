@@ -57,7 +57,7 @@ def _texts(nodes: Iterable[ast.AST]) -> Iterator[str]:
     """Yield string literals that can be names of files in the same folder."""
     for node in nodes:
         if isinstance(node, ast.Constant) and isinstance(node.value, str) \
-                and 0 < len(node.value) < 256 and '\0' not in node.value \
+                and 0 < len(node.value.encode(errors='replace')) < 256 and '\0' not in node.value \
                 and '/' not in node.value and node.value not in ('.', '..'):
             yield node.value
 

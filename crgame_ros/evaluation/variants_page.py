@@ -15,6 +15,7 @@ from crgame_ros.evaluation.cell_scene import CellScene
 from crgame_ros.evaluation.file_names import REPORTS
 from crgame_ros.evaluation.judging import expectations_of, shortfalls, worst_of
 from crgame_ros.evaluation.results.parts import stored_rows
+from crgame_ros.evaluation.summary.measures import better_of
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.paths import page_directory
 from crgame_ros.variation.space import Axis, space_of, Variant
@@ -194,7 +195,7 @@ def _write(folder: Path, grid: CellGrid, scene: CellScene,
 def _point(row: Row, vehicles: Sequence[Row], expectations: Sequence[Expectation],
            goals: Sequence[str]) -> VariantPoint:
     variant = {**json.loads(str(row['variant'] or '{}')), 'planner': row['planner']}
-    values = [worst_of(goal, vehicles, 1) for goal in goals]
+    values = [worst_of(goal, vehicles, better_of(goal) or 1) for goal in goals]
     if row['status'] != 'ok':
         return VariantPoint(str(row['cell']), variant, values, 'unknown', str(row['reason'] or ''))
     broken = [line for each in expectations for line in shortfalls(each, vehicles)]

@@ -141,9 +141,9 @@ def _has_runs(path: Path) -> bool:
 
 def _recorded(path: Path) -> DrivenRun:
     bag = recording_in(path)
-    # Log times are those of the wall clock.
-    when = datetime.fromtimestamp(describe(bag).start_ns // 10**9)
-    return DrivenRun(read_trajectories(bag), when)
+    # Log times are those of the wall clock; of an offline run they begin at 0.
+    start_s = describe(bag).start_ns // 10**9
+    return DrivenRun(read_trajectories(bag), datetime.fromtimestamp(start_s) if start_s else None)
 
 
 def _cells(path: Path, choice: DrivingChoice) -> Iterator[Drive]:

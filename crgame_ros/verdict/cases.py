@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The cases of a test: a run of a game with a seed each, on all cores."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field, replace
 import multiprocessing
 from pathlib import Path
@@ -76,17 +77,21 @@ class CaseResult:
         return not self.error and not any(self.broken)
 
 
-def find_games(places: Sequence[Path]) -> list[Path]:
+def find_games(places: Sequence[Path], out: Path) -> list[Path]:
     """
     Return the game files of files and folders; of a folder those with expectations.
 
+    :param out: folder of results within them, which is left out, as hidden folders are.
     :raises InputError: if there is none.
     """
     found = []
     for place in places:
         if place.is_dir():
-            files = sorted(file for file in place.rglob('*.yaml') if file.stem.count('.') == 0)
-            found += [file for file in files if _has_expectations(file)]
+            results = out.resolve() if place.resolve() in out.resolve().parents else None
+            found += [file for file in sorted(place.rglob('*.yaml'))
+                      if file.stem.count('.') == 0 and results not in file.resolve().parents
+                      and not any(part.startswith('.') for part in file.relative_to(place).parts)
+                      and _has_expectations(file)]
         elif place.is_file():
             found.append(place)
         else:
@@ -159,21 +164,36 @@ def run_cases(cases: Sequence[Case], out: Path, workers: int,
     :return: in the order of the cases.
     """
     found: dict[int, CaseResult] = {}
+    broken: dict[int, CaseResult] = {}
+    for number, result, died in _results(dict(enumerate(cases)), out, workers):
+        if died:
+            broken[number] = result
+        else:
+            found[number] = result
+            told(result)
+    # A process that dies takes those of all other cases along.
+    for number in sorted(broken):
+        for _, result, _ in _results({number: cases[number]}, out, 1):
+            found[number] = result
+            told(result)
+    return [found[number] for number in range(len(cases))]
+
+
+def _results(cases: Mapping[int, Case], out: Path,
+             workers: int) -> Iterator[tuple[int, CaseResult, bool]]:
+    """Yield the numbers and results of cases as they come, and whether a process had died."""
     context = multiprocessing.get_context('spawn')
     with ProcessPoolExecutor(min(workers, len(cases)), mp_context=context) as pool:
-        waiting = {pool.submit(run_case, case, out): number
-                   for number, case in enumerate(cases)}
+        waiting = {pool.submit(run_case, case, out): number for number, case in cases.items()}
         try:
             for done in as_completed(waiting):
                 number = waiting[done]
                 try:
-                    result = done.result()
+                    yield number, done.result(), False
                 except Exception as error:  # a process that died, or a planner's fault
-                    result = CaseResult(cases[number], (), (),
-                                        f'{type(error).__name__}: {error}', 0.0)
-                found[number] = result
-                told(result)
-        except KeyboardInterrupt:
+                    yield (number, CaseResult(cases[number], (), (),
+                                              f'{type(error).__name__}: {error}', 0.0),
+                           isinstance(error, BrokenProcessPool))
+        except (KeyboardInterrupt, GeneratorExit):
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    return [found[number] for number in range(len(cases))]

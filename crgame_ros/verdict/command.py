@@ -115,7 +115,13 @@ def _cases(values: argparse.Namespace) -> 'list[Case]':
         raise InputError('is for a planner', '--option', 'name it with --planner')
     places = [Path(name) if Path(name).exists() else find_game(Path(name))
               for name in values.games]
-    games = [game for game in find_games(places) if values.word in game.stem]
+    games = [game for game in find_games(places, values.out) if values.word in game.stem]
+    first: dict[str, Path] = {}
+    for game in games:
+        # Reports and copies are named by it.
+        if first.setdefault(game.stem, game) != game:
+            raise InputError(f'has the name of {first[game.stem]}', str(game),
+                             'rename one of them, or test them one by one')
     planner = named_file(values.planner, Path.cwd()) if values.planner else None
     options = dict(read_options(values.option))
     cases = [Case(game, seed, planner, options) for game in games

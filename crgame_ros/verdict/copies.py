@@ -32,6 +32,9 @@ DIGITS = 14
 _SIDES = {'left': 'right', 'right': 'left', 'leftBound': 'rightBound', 'rightBound': 'leftBound',
           'adjacentLeft': 'adjacentRight', 'adjacentRight': 'adjacentLeft',
           'successorsLeft': 'successorsRight', 'successorsRight': 'successorsLeft'}
+# Of traffic lights.
+_DIRECTIONS = {'left': 'right', 'right': 'left', 'leftStraight': 'straightRight',
+               'straightRight': 'leftStraight'}
 _LATERAL = ('y', 'orientation', 'yawRate', 'steeringAngle', 'slipAngle', 'velocityY')
 # Keys of a game with an id of its scenario, and keys with several.
 _ID, _IDS = ('lanelet', 'planning_problem', 'object'), ('lanelets',)
@@ -197,6 +200,8 @@ def _edited_scenario(path: Path, place: Placement, to: Path) -> Path:
 
 def _mirror(element: 'ElementTree.Element[str]') -> None:
     element.tag = _SIDES.get(element.tag, element.tag)
+    if element.tag == 'direction' and element.text:
+        element.text = _DIRECTIONS.get(element.text.strip(), element.text)
     if element.tag in _LATERAL:
         for value in (element, *element):
             if value.text and value.text.strip():

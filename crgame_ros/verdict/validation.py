@@ -88,7 +88,7 @@ def journal_faults(path: Path) -> tuple[int, list[str]]:
             kind, at = entry['entry'], entry['at']
             if not isinstance(kind, str) or not math.isfinite(at):
                 raise ValueError('entry or time')
-        except (ValueError, LookupError, TypeError, RecursionError):
+        except (ValueError, LookupError, TypeError, OverflowError, RecursionError):
             faults.append(f'{path}: line {number} is no entry with its time')
             continue
         count += 1

@@ -48,7 +48,8 @@ class Verdict:
     @property
     def is_kept(self) -> bool:
         """Return whether enough runs kept it."""
-        return self.good >= self.needed * self.runs
+        # 0.55 * 100 is a little more than 55.
+        return self.good >= self.needed * self.runs - 1e-9
 
     def interval(self) -> tuple[float, float]:
         """Return the 95 % interval by Wilson of the share of runs that keep it."""

@@ -36,6 +36,8 @@ def test_names_are_found_where_they_stand_and_lead_on(tmp_path: Path) -> None:
         (tmp_path / name).write_text("'unnamed.csv'")
     found = code_neighbours(tmp_path / 'planner.py')
     assert [path.name for path in found] == ['a.npz', 'more.py', 'table.csv']
+    (tmp_path / 'long.py').write_text(f"'{'ä' * 200}'", encoding='utf-8')
+    assert code_neighbours(tmp_path / 'long.py') == []
     (tmp_path / 'broken.py').write_text("def 'a.npz'")
     assert code_neighbours(tmp_path / 'broken.py') == []
 

@@ -2,11 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Evaluations from Python: the same cells as runs of their own."""
 
+import json
 from pathlib import Path
+import re
 
 import crgame_ros
+from crgame_ros.cli import main
+from crgame_ros.evaluation.cell_grid import make_grid
+from crgame_ros.evaluation.evaluation import rows_of
 from crgame_ros.evaluation.folder import EvaluationFolder
+from crgame_ros.evaluation.plan import parse_plan
 from crgame_ros.evaluation.results.parts import ResultParts
+from crgame_ros.evaluation.variants_page import write_variant_pages
 import pytest
 
 GAME = crgame_ros.scenarios_directory() / 'cut_in.yaml'
@@ -59,3 +66,30 @@ def test_a_refused_evaluation_leaves_the_folder_as_it_was(tmp_path: Path) -> Non
     with pytest.raises(crgame_ros.InputError, match='something else is in it'):
         crgame_ros.evaluate(PLAN, other)
     assert [path.name for path in other.iterdir()] == ['letter.txt']
+
+
+def test_the_page_of_variants_shows_the_worst_av(tmp_path: Path) -> None:
+    """The greatest DRAC of two AVs, and the smallest distance."""
+    place = EvaluationFolder(tmp_path)
+    grid = make_grid(parse_plan({
+        'games': [str(GAME.with_name('cut_in_family.yaml'))], 'planners': ['idm'],
+        'variants': {'number': 1}}, 'plan', tmp_path), place.store)
+    with ResultParts(tmp_path) as parts:
+        parts.add(*(rows_of(cell, {'cell': {'status': 'ok'}, 'work': {}, 'vehicles': [
+            {'vehicle': name, 'role': 'autonomous', 'worst_drac': drac,
+             'worst_min_distance': distance}
+            for name, drac, distance in (('av0', 2.0, 5.0), ('av1', 7.0, 3.0))]})
+            for cell in grid))
+    page, = write_variant_pages(tmp_path, grid, ('worst_drac', 'min_distance'))
+    data = re.search(r'<script id="data" type="application/json">(.*?)</script>',
+                     page.read_text())
+    assert data is not None
+    assert [point['values'] for point in json.loads(data[1])['points']] == [[7.0, 3.0]]
+
+
+def test_files_of_one_name_are_refused(tmp_path: Path,
+                                       capsys: pytest.CaptureFixture[str]) -> None:
+    """The traffic of one would take the place of the other's."""
+    assert main(['evaluate', '--games', str(GAME), '--traffic', 'a/busy.yaml', 'b/busy.yaml',
+                 '--out', str(tmp_path / 'out')]) == 2
+    assert '--traffic: two files have one name; rename one of them' in capsys.readouterr().err

@@ -9,9 +9,10 @@ from xml.etree import ElementTree
 from crgame_ros.analysis.pictures.scene_frame import read_followed_plans
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.cli import main
-from crgame_ros.game.game import load_game
+from crgame_ros.game.game import Game, load_game
 from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
 from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.offline_recording import write_recording
 from crgame_ros.recording.recorded_game import recorded_inputs
 from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.simulation.offline import OfflineResult, run_offline
@@ -145,6 +146,20 @@ def test_a_run_becomes_a_film(result: OfflineResult, recorder: Any, tmp_path: Pa
     with Image.open(film) as pictures:
         assert pictures.n_frames == 11
     assert not (tmp_path / 'run' / 'figures').exists()
+
+
+def test_a_run_that_nobody_drove_is_told(tmp_path: Path,
+                                         capsys: pytest.CaptureFixture[str]) -> None:
+    """A scenario without a planning problem."""
+    tree = ElementTree.parse(scenarios_directory() / 'ZAM_Crossing-1_1_T-1.xml')
+    for problem in tree.findall('planningProblem'):
+        tree.getroot().remove(problem)
+    tree.write(tmp_path / 'alone.xml')
+    setup = build_setup(Game(tmp_path / 'alone.xml', humans=()))
+    assert not setup.vehicle_ids
+    write_recording(run_offline(setup, duration_s=0.5, keep_messages=True), tmp_path / 'run')
+    assert main(['figures', str(tmp_path / 'run'), '--figures', 'frames']) == 2
+    assert 'has no driven vehicle to draw' in capsys.readouterr().err
 
 
 @pytest.mark.slow

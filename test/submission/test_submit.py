@@ -18,9 +18,14 @@ from crgame_ros.cli import main
 from crgame_ros.evaluation.cell_grid import make_grid
 from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.evaluation.plan import parse_plan
+from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.offline_recording import write_recording
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.export_network import solution_schema_errors
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
+from crgame_ros.submission.drives import DrivingChoice, find_drives
 import numpy as np
 import pytest
 
@@ -123,6 +128,13 @@ def test_of_several_runs_of_a_scenario_the_best_goes_in(
     found = json.loads(capsys.readouterr().out)
     assert [each['submitted'] for each in found] == [True, False]
     assert found[1]['valid'] and 'no more cost' in found[1]['reason']
+
+
+def test_a_run_driven_offline_has_no_date(tmp_path: Path) -> None:
+    setup = build_setup(load_game(scenarios_directory() / 'cut_in.yaml'))
+    write_recording(run_offline(setup, duration_s=0.5, keep_messages=True), tmp_path)
+    drive, = find_drives([str(tmp_path)], DrivingChoice())
+    assert drive.make().when is None
 
 
 @pytest.mark.parametrize(('words', 'said'), [

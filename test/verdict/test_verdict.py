@@ -16,9 +16,9 @@ from crgame_ros.game.game import parse_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.export_network import schema_errors
 from crgame_ros.schema.writing import write
-from crgame_ros.verdict.cases import Case, CaseResult
-from crgame_ros.verdict.copies import placed, Placement
-from crgame_ros.verdict.verdicts import verdicts_of
+from crgame_ros.verdict.cases import Case, CaseResult, find_games, run_cases
+from crgame_ros.verdict.copies import _edited_scenario, placed, Placement
+from crgame_ros.verdict.verdicts import Verdict, verdicts_of
 from lxml import etree
 import pytest
 
@@ -133,6 +133,54 @@ def test_a_share_of_runs_is_enough_and_has_its_interval() -> None:
     assert verdict.interval() == pytest.approx((middle - half, middle + half), rel=1e-6)
     worse, = verdicts_of([*results[:2], *results[:8]])
     assert not worse.is_kept
+    # 0.55 * 100 is 55.00000000000001.
+    assert Verdict(Path('g.yaml'), '', 55, 100, 0.55, (), 1.0).is_kept
+
+
+def test_games_of_one_name_and_results_among_them(tmp_path: Path) -> None:
+    game = f'scenario: {scenarios_directory()}/ZAM_CutIn-1_1_T-1.xml\nduration: 0.5\n' + EXPECT
+    for folder in ('a', 'b', 'verdicts/cut_in-0', '.hidden'):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / 'cut_in.yaml').write_text(game)
+    assert find_games([tmp_path], tmp_path / 'verdicts') == [
+        tmp_path / 'a' / 'cut_in.yaml', tmp_path / 'b' / 'cut_in.yaml']
+    assert run(tmp_path, '.') == (2, '', 'error: b/cut_in.yaml: has the name of a/cut_in.yaml; '
+                                  'rename one of them, or test them one by one\n')
+
+
+DYING = """
+import os
+from crgame_ros.planner.constant_velocity import ConstantVelocityPlanner
+
+
+class Dying(ConstantVelocityPlanner):
+    def setup(self, context):
+        super().setup(context)
+        if context.seed == 0:
+            os.abort()
+"""
+
+
+def test_a_process_that_dies_fails_its_own_run_alone(tmp_path: Path) -> None:
+    (tmp_path / 'dying.py').write_text(DYING)
+    (tmp_path / 'short.yaml').write_text(
+        f'scenario: {scenarios_directory()}/ZAM_CutIn-1_1_T-1.xml\nduration: 0.5\n'
+        'avs: [{id: av0}]\nexpect: [{measure: distance, at_least: 0}]\n')
+    found = run_cases([Case(tmp_path / 'short.yaml', seed, f'{tmp_path}/dying.py:Dying')
+                       for seed in range(3)], tmp_path / 'out', 2, lambda _: None)
+    assert [result.error.partition(':')[0] for result in found] == ['BrokenProcessPool', '', '']
+
+
+def test_a_mirrored_scenario_has_its_lights_turned(tmp_path: Path) -> None:
+    source = scenarios_directory() / 'ZAM_Intersection-1_1_T-1.xml'
+    tree = etree.parse(source)
+    for number, direction in ((900, 'left'), (901, 'straightRight'), (902, 'leftRight')):
+        tree.getroot().append(etree.fromstring(
+            f'<trafficLight id="{number}"><direction>{direction}</direction></trafficLight>'))
+    tree.write(tmp_path / 'lit.xml')
+    edited = _edited_scenario(tmp_path / 'lit.xml', Placement(mirrored=True), tmp_path / 'to.xml')
+    assert [each.text for each in etree.parse(edited).iter('direction')] == [
+        'right', 'leftStraight', 'leftRight']
 
 
 @pytest.mark.parametrize(('expected', 'what'), [

@@ -59,7 +59,8 @@ class DriverControls:
 
     def pieces(self) -> Iterator[slice]:
         """Yield the pieces in which the driver drove without a gap."""
-        gaps = np.flatnonzero(np.diff(self.times_s) > LONGEST_GAP_S + 0.5 * self.dt_s) + 1
+        longest_s = max(LONGEST_GAP_S, self.dt_s) + 0.5 * self.dt_s
+        gaps = np.flatnonzero(np.diff(self.times_s) > longest_s) + 1
         bounds = [0, *gaps.tolist(), len(self.times_s)]
         for first, end in zip(bounds[:-1], bounds[1:], strict=True):
             if end > first:

@@ -321,13 +321,18 @@ class Criticality:
             for number, vehicle in enumerate(self._found))
 
     def as_dict(self) -> dict[str, object]:
-        """Return the results as a JSON-compatible dictionary: SI units, times since the start."""
+        """
+        Return the results as a JSON-compatible dictionary: SI units, times since the start.
+
+        A value that is infinite, as DRAC is after a contact, is None.
+        """
         return {
             'thresholds': self.thresholds._asdict(),
             'vehicles': {
                 vehicle.vehicle_id: {
-                    'worst': {name: {'value': worst.value, 'unit': measure.unit,
-                                     'of': worst.other, 'time_s': worst.time_s}
+                    'worst': {name: {'value': worst.value if math.isfinite(worst.value) else None,
+                                     'unit': measure.unit, 'of': worst.other,
+                                     'time_s': worst.time_s}
                               for name, measure in MEASURES.items()
                               if (worst := vehicle.worst.get(name))},
                     'exposures': {name: {'value': value, 'unit': EXPOSURES[name].unit}

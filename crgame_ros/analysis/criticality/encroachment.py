@@ -188,8 +188,15 @@ class EncroachmentDetector:
             return None
         known = pair in self._inside or (second, first) in self._inside
         self._inside.add(pair)
-        if known or share == 0.0:
+        if known:
             return None
+        if share == 0.0:
+            # Both entered within the step before, if their footprints met in it.
+            if not _overlap(before, *pair) or _overlap(self._past[-2], *pair) is not False:
+                return None
+            crossing = WayCrossed(first, second, before.time_s, 0.0, False)
+            self.crossings.append(crossing)
+            return crossing
         entered_s = before.time_s + share * (now.time_s - before.time_s)
         passage = _Passage(len(self.crossings), (*self._past, now),
                            [begin + share * (end - begin)])
@@ -213,6 +220,14 @@ class EncroachmentDetector:
             left_s = _time_left(pair[0], passage.before, _hulls(swept[:-1], swept[1:]))
             self.crossings[passage.number] = estimate._replace(
                 pet_s=max(estimate.entered_s - left_s, 0.0), is_estimate=False)
+
+
+def _overlap(moment: _Moment, first: int, second: int) -> bool | None:
+    """Return whether two footprints touch at a moment; None if one is absent."""
+    if not np.isfinite(moment.centers[[first, second]]).all():
+        return None
+    return bool(time_to_contact(moment.outlines[first, None], moment.outlines[second, None],
+                                _STILL, _STILL)[0] == 0.0)
 
 
 def _direction(way: FloatArray) -> FloatArray:

@@ -4,7 +4,7 @@
 
 from collections.abc import Collection, Iterator, Sequence
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
 from crgame_ros.recording.run_record import RunRecord
@@ -38,22 +38,6 @@ class Moment(NamedTuple):
     vehicles: tuple[str, ...]
 
 
-class Touching(Protocol):
-    """The part of a contact that is needed: a `Contact`, or an entry in `timing.json`."""
-
-    @property
-    def vehicle_id(self) -> str:
-        """Return the driven vehicle."""
-
-    @property
-    def other_id(self) -> str:
-        """Return what it touched."""
-
-    @property
-    def n(self) -> int:
-        """Return the simulation step."""
-
-
 class Touch(NamedTuple):
     """An entry of `contacts` in `timing.json`."""
 
@@ -76,7 +60,7 @@ class _Ranked(NamedTuple):
 
 
 def critical_moments(record: RunRecord, criticality: Criticality,
-                     contacts: Sequence[Touching] = ()) -> tuple[Moment, ...]:
+                     contacts: Sequence[Touch] = ()) -> tuple[Moment, ...]:
     """
     Return the moments of a run, the most critical one first.
 

@@ -149,7 +149,8 @@ def _vehicles(run: Run) -> Iterator[tuple[str, ...]]:
 
 def _people(run: Run) -> Iterator[tuple[str, ...]]:
     """Yield the people in cockpit seats, and the local devices that drove."""
-    last_n = int(run.log.ks[-1] - run.log.ks[0]) * run.log.game.scheduler.steps_per_tick
+    scheduler = run.log.game.scheduler
+    last_n = int(run.log.ks[-1] - scheduler.k0) * scheduler.steps_per_tick
     for spell, delay_ms, _ in run.record.drivers:
         person = spell.person
         until_n = last_n if spell.until_n is None else spell.until_n

@@ -47,7 +47,7 @@ class TrajectoryFeasibility:
     :param excess_steering_rate: likewise for the steering rate [rad/s]
     :param excess_friction: likewise for the magnitude of the longitudinal and lateral
         acceleration [m/s^2]
-    :param step_s: time of a transition [s]
+    :param step_s: time of a transition; that of the last one may be shorter [s]
     """
 
     feasible: bool | None
@@ -81,7 +81,8 @@ def check_feasibility(found: PlanningProblemSolution, problem: PlanningProblem, 
     """
     Check every transition of a solution's trajectory with the drivability checker.
 
-    If time steps are shorter than `LEAST_STEP_S`, a transition combines enough of them.
+    If time steps are shorter than `LEAST_STEP_S`, a transition combines enough of them; the last
+    one combines what is left.
 
     :param dt_s: time step [s]
     :param progress: called with the share checked so far, 0 to 1.
@@ -89,14 +90,19 @@ def check_feasibility(found: PlanningProblemSolution, problem: PlanningProblem, 
     dynamics = _dynamics(found)
     if found.trajectory_type in (TrajectoryType.Input, TrajectoryType.PMInput):
         return _check_inputs(found, problem, dynamics, dt_s)
-    stride = max(1, round(LEAST_STEP_S / dt_s))
-    states = found.trajectory.state_list[::stride]
+    stride = max(1, math.ceil(LEAST_STEP_S / dt_s - 1e-9))
+    every = found.trajectory.state_list
+    states = every[::stride]
+    if states[-1] is not every[-1]:
+        # A shorter last transition, or the end would not be checked.
+        states.append(every[-1])
     if len(states) < 2:
         return TrajectoryFeasibility(None, None, 'the trajectory has no transition')
     measured = []
     for number, (now, then) in enumerate(zip(states[:-1], states[1:], strict=True)):
         try:
-            measured.append(_transition(now, then, dynamics, stride * dt_s))
+            step_s = (int(then.time_step) - int(now.time_step)) * dt_s
+            measured.append(_transition(now, then, dynamics, step_s))
         except Exception as error:  # the checker can raise any exception
             return TrajectoryFeasibility(
                 None, int(now.time_step), one_line(f'{type(error).__name__}: {error}'))

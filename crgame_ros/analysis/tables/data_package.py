@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from crgame_ros.analysis.tables.column import Column, FLAG, TableDeclaration
-from crgame_ros.analysis.tables.writer import Format, FORMULA_GUARD, NOT_A_NUMBER
+from crgame_ros.analysis.tables.writer import Format, FORMULA_GUARD, INFINITE, NOT_A_NUMBER
 from crgame_ros.errors import InputError
 from crgame_ros.recording.run_folder import PACKAGE_FILE
 from crgame_ros.version import __version__
@@ -26,9 +26,9 @@ DESCRIPTION = (
     'Tables of runs of crgame_ros. SI units and radians; positions are in the frame map of the '
     'simulation. A value that is missing is null in Parquet; in CSV a missing number is '
     f'{NOT_A_NUMBER}, any other missing value an empty field; empty texts are missing. Infinite '
-    'numbers are inf and -inf. Texts have no control characters but tabs and ends of lines; in '
-    'CSV those that a spreadsheet would take for a formula (= + - @, tab, carriage return) begin '
-    f'with {FORMULA_GUARD}.')
+    f'numbers are inf and -inf, in CSV {INFINITE} and -{INFINITE}. Texts have no control '
+    'characters but tabs and ends of lines; in CSV those that a spreadsheet would take for a '
+    f'formula (= + - @, tab, carriage return) begin with {FORMULA_GUARD}.')
 _TYPES = {'number': pa.float64(), 'integer': pa.int64(), 'string': pa.string(),
           'boolean': pa.bool_()}
 _NULLS = ['', NOT_A_NUMBER]

@@ -186,7 +186,7 @@ def chosen_measures(names: Sequence[str] | None, known: Iterable[str]
         if name in there:
             found.append(there[name])
         elif name in _NUMERIC and name in known:
-            found.append(SummaryMeasure(name, name.replace('_', ' '), name, _better(name)))
+            found.append(SummaryMeasure(name, name.replace('_', ' '), name, better_of(name)))
         else:
             more = sorted(known & _NUMERIC.keys() - there.keys())
             raise InputError(f'no measure {short(name)} here', '--measure',
@@ -196,7 +196,9 @@ def chosen_measures(names: Sequence[str] | None, known: Iterable[str]
     return tuple(found)
 
 
-def _better(column: str) -> int:
-    """Return which values of a column are better; for criticality, the less critical ones."""
-    measure = CRITICALITY.get(column.removeprefix('worst_'))
-    return -measure.worst if measure is not None and column.startswith('worst_') else 0
+def better_of(name: str) -> int:
+    """Return 1 if greater values of a measure or column are better, -1 if smaller ones, or 0."""
+    if name in MEASURES:
+        return MEASURES[name].better
+    measure = CRITICALITY.get(name.removeprefix('worst_'))
+    return -measure.worst if measure is not None and name.startswith('worst_') else 0

@@ -110,6 +110,13 @@ def test_uneven_times_are_made_even_and_gaps_cut() -> None:
         assert reversal_rate(pieces, DT_S, VISUAL) * minutes == pytest.approx(count, abs=0.1)
 
 
+def test_commands_at_five_hertz_are_one_piece() -> None:
+    """Each second has five of them."""
+    times_s = 0.2 * np.arange(1, 51)
+    controls = DriverControls.from_commands(times_s, np.zeros((50, 4)), 1.0, 0.2)
+    assert len(list(controls.pieces())) == 1
+
+
 @pytest.mark.parametrize('dt_s', [0.01, 0.02, 0.025])
 def test_the_first_turn_counts_from_the_first_sample(dt_s: float) -> None:
     """From bottom to top, four times in 12.5 s: the end itself is no stationary point."""

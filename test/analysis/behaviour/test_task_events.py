@@ -87,6 +87,13 @@ LIGHTS = (
     light(960, 'stimulus', 9), light(961, 'shown', 9))
 
 
+def test_an_open_stimulus_ends_with_the_log(record: RunRecord) -> None:
+    """At 10 s since the run's start, also where the recording began a second later."""
+    late = replace(record.log, ks=record.log.ks[10:])
+    row = task_events(replace(record, log=late, tasks=LIGHTS))[-1]
+    assert (row.outcome, row.duration_s) == ('open', pytest.approx(0.4))
+
+
 @pytest.fixture(scope='module')
 def events(record: RunRecord) -> Sequence[TaskEvent]:
     """Return the rows of the lights."""

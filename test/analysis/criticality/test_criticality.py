@@ -3,12 +3,14 @@
 """Criticality of two cars in closed form, and on real maps in any placement and numbering."""
 
 from dataclasses import replace
+import json
 import math
 from pathlib import Path
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality, TickMeasures
+from crgame_ros.analysis.measure_command import HEAD, NEVER, replay_rows
 from crgame_ros.game.game import DrivabilitySpec
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
@@ -249,6 +251,10 @@ def test_a_closely_passed_car_does_not_lead(cut_in: LoadedScenario) -> None:
         assert values[COLUMN['gap']] == pytest.approx(gap, nan_ok=True)
         assert (values[COLUMN['ttc']] == 0.0) is not math.isnan(gap)
         assert values[COLUMN['min_distance']] == pytest.approx(max(offset - 1.8, 0.0))
+        # Infinite values are no JSON.
+        json.dumps(found := criticality.as_dict(), allow_nan=False)
+        row, = replay_rows([{'planner': 'recorded', 'criticality': found}])
+        assert row[HEAD.index('a_req [m/s^2]')] == NEVER
 
 
 SCENARIOS = ['DEU_Flensburg-10_1_T-1', 'DEU_Guetersloh-36_1_T-1', 'USA_Lanker-1_3_T-1',

@@ -47,6 +47,14 @@ def test_two_cars_at_a_right_angle(turn: float) -> None:
     assert crossing.pet_s == pytest.approx(1.7, abs=1e-6)
 
 
+def test_both_enter_within_one_step() -> None:
+    """They crash at the crossing: the second enters before the first has left."""
+    crossing, = _crossings(np.array([(-20.0, 0.0), (0.0, -20.0)]),
+                           np.array([(10.0, 0.0), (0.0, 10.0)]))
+    # Both fronts are 1 m before the middle after (20 - 1 - 2) / 10 s.
+    assert crossing.pet_s == 0.0 and crossing.entered_s == pytest.approx(1.7, abs=0.1 + 1e-6)
+
+
 def test_the_watched_one_may_be_second() -> None:
     """The same with their numbers exchanged."""
     crossing, = _crossings(np.array([(0.0, -35.0), (-20.0, 0.0)]),

@@ -55,6 +55,12 @@ def test_what_the_model_drove_is_feasible(problem: PlanningProblem) -> None:
     assert found.position_error < 1e-4 and found.reason == ''
     fine = check_feasibility(_solution(_driven(problem, 12, 0.05)), problem, 0.05)
     assert fine.feasible and fine.transitions == 6 and fine.step_s == pytest.approx(0.1)
+    # 14 steps: four transitions of 0.12 s, and the last two steps, where it jumps.
+    states = _driven(problem, 14, 0.04)
+    states[-1].velocity += 5.0
+    last = check_feasibility(_solution(states), problem, 0.04)
+    assert last.step_s == pytest.approx(0.12) and last.transitions == 5
+    assert (last.infeasible, last.first_step) == (1, 12)
 
 
 @pytest.mark.parametrize(('change', 'first', 'excess', 'reason'), [
