@@ -180,7 +180,7 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add('--certificate', type=Path, metavar='FILE',
         help='PEM file for TLS, with --key (default: --open-cockpit makes one by openssl)')
     add('--key', type=Path, metavar='FILE', help='PEM file with the key of the certificate')
-    add('--framed-by', type=_origin, action='append', default=argparse.SUPPRESS, metavar='ORIGIN',
+    add('--framed-by', type=_origin, action='append', default=[], metavar='ORIGIN',
         help="let pages of this origin, such as http://127.0.0.1:8070, show the cockpit's "
         'within them; may be given several times (default: none may)')
     add('--replay', type=Path, metavar='BAG',
@@ -198,7 +198,8 @@ def build_parser(program: str) -> argparse.ArgumentParser:
         'domain')
     add('--open-topics', action='store_true',
         help='let other programs publish every topic, for instance a traffic node of your own '
-        '(default: plans, commands of drivers, joysticks, triggers and diagnostics)')
+        '(default: plans, commands of drivers, joysticks, orders of seats, triggers and '
+        'diagnostics)')
     add('--own-orders', action='store_true',
         help='obey the page alone: services such as /sim/stop do not answer other programs')
     add('--out', type=Path, metavar='DIR',
@@ -218,6 +219,7 @@ def parse_arguments(arguments: Sequence[str], program: str = 'run.sh') -> RunReq
     values['planners'] = tuple(values['planners'])
     values['options'] = read_options(values['options'])
     values['problems'] = tuple(values['problems'])
+    values['framed_by'] = tuple(values['framed_by'])
     values['driver'], values['drivers'] = read_drivers(values['drivers'])
     request = RunRequest(**values)
     if request.replay is not None and request != RunRequest(

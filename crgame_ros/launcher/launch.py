@@ -218,7 +218,8 @@ def launch(arguments: Sequence[str] | None = None) -> int:
                                 new_token() if request.token else None, say=print_now)
         require_ros()
         prepare_environment()
-        domain = os.environ.setdefault('ROS_DOMAIN_ID', str(free_domain_id()))
+        domain = os.environ.get('ROS_DOMAIN_ID') or str(free_domain_id())
+        os.environ['ROS_DOMAIN_ID'] = domain
         with ExitStack() as holding:
             # Held before anything is written: a second simulation leaves no folder.
             holding.enter_context(hold_namespace(domain, request.namespace))

@@ -110,19 +110,12 @@ def effective_game(request: RunRequest, game: Game | None = None) -> Game:
         game = load_game(default_game())
     if request.game is not None and request.scenario is not None:
         game = replace(game, scenario=request.scenario)
-    if request.problems:
-        if game.avs is not None:
-            raise InputError('the game names its AVs', '--problem', 'leave it out')
-        game = replace(game, avs=tuple(AvSpec(f'av{index}', planning_problem=number)
-                                       for index, number in enumerate(request.problems)))
     if request.driver is not None:
         if not game.humans:
             raise InputError('the game has no human', '--driver', 'leave it out')
         first = replace(game.humans[0], driver=_from_here(request.driver))
         game = replace(game, humans=(first, *game.humans[1:]))
-    if request.drivers:
-        game = _with_drivers(game, dict(request.drivers))
-    return _with_limits(game, request)
+    return _with_options(game, request)
 
 
 def _with_drivers(game: Game, drivers: Mapping[str, str]) -> Game:
@@ -137,8 +130,15 @@ def _with_drivers(game: Game, drivers: Mapping[str, str]) -> Game:
         for human in game.humans))
 
 
-def _with_limits(game: Game, request: RunRequest) -> Game:
-    """Return the game with the request's duration and rate."""
+def _with_options(game: Game, request: RunRequest) -> Game:
+    """Return the game with the request's planning problems, named drivers, duration and rate."""
+    if request.problems:
+        if game.avs is not None:
+            raise InputError('the game names its AVs', '--problem', 'leave it out')
+        game = replace(game, avs=tuple(AvSpec(f'av{index}', planning_problem=number)
+                                       for index, number in enumerate(request.problems)))
+    if request.drivers:
+        game = _with_drivers(game, dict(request.drivers))
     if request.duration_s is not None:
         game = replace(game, duration=request.duration_s)
     if request.rate_hz is not None:
@@ -163,7 +163,7 @@ def effective_setup(request: RunRequest, game: Game | None = None) -> Setup:
             setup = build_setup(effective_game(request, game))
         else:
             recorded = read_recorded_game(bag, other_planners=bool(request.planners))
-            setup = build_setup(_with_limits(recorded.game, request), recorded.loaded)
+            setup = build_setup(_with_options(recorded.game, request), recorded.loaded)
         setup = with_replayed_events(with_planners(
             setup, request.planners, dict(request.options)))
     notices = [*setup.notices, *replay_notices(setup)]

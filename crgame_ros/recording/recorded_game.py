@@ -150,7 +150,7 @@ def _check_same(setup: Setup, recorded: GameDocument, bag: Path) -> None:
         raise InputError(
             f'was recorded in another scenario ({recorded.benchmark_id}) than '
             f'{setup.loaded.source}',
-            str(bag), 'leave the game out: the recording carries its own')
+            str(bag), 'leave the game out and give --driver replay:BAG: it carries its own')
     here, there = setup.scheduler, recorded.scheduler
     if (here.time_step_ns, here.steps_per_tick) != (there.time_step_ns, there.steps_per_tick):
         raise InputError(f'was recorded at {1.0 / there.dt_s:g} Hz, not {1.0 / here.dt_s:g} Hz',

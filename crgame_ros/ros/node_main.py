@@ -127,7 +127,7 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
     from crgame_ros.ros.environment import prepare_environment
     prepare_environment()
 
-    from crgame_ros.errors import CrgameError
+    from crgame_ros.errors import CrgameError, InputError, one_line
     from crgame_ros.ros.shared_memory import remove_half_made_ports
     import rclpy
     from rclpy.exceptions import ParameterException
@@ -139,7 +139,10 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
     code = 0
     node = None
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        except RuntimeError as error:
+            raise InputError(f'ROS refuses it: {one_line(str(error))}', 'command line') from error
         node = create()
         _check_parameters(node)
         # Planners and the recorder yield processor time to the simulation and the driver. The

@@ -3,8 +3,11 @@
 """The command `crgame dds-profile`: nodes started one by one believe each other alone."""
 
 import argparse
+from contextlib import suppress
+import os
 from pathlib import Path
 import shlex
+from tempfile import TemporaryDirectory
 
 from crgame_ros.errors import InputError
 
@@ -33,14 +36,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _write(values: argparse.Namespace) -> int:
     from crgame_ros.ros.environment import PROFILE_VARIABLES
-    from crgame_ros.ros.run_profile import check_believing, write_run_profile
+    from crgame_ros.ros.run_profile import check_believing, check_profile, write_run_profile
     file = values.file.absolute()
     if not file.exists():
         check_believing('dds-profile')
         try:
-            write_run_profile(file, values.namespace, own_orders=values.own_orders)
+            # Several shells may begin at once: they all get the first profile, and get it whole.
+            with TemporaryDirectory(dir=file.parent) as folder, suppress(FileExistsError):
+                whole = Path(folder) / file.name
+                write_run_profile(whole, values.namespace, own_orders=values.own_orders)
+                os.link(whole, file)
         except OSError as error:
             raise InputError(f'cannot be written ({error.strerror})', str(file),
                              'name a file in a folder of yours') from error
+    check_profile(file, values.namespace, values.own_orders)
     print('export', *(f'{name}={shlex.quote(str(file))}' for name in PROFILE_VARIABLES))
     return 0

@@ -100,6 +100,32 @@ def write_run_profile(path: Path, namespace: str, humans: Collection[str] = (),
         tree.write(file, 'utf-8', xml_declaration=True)
 
 
+def check_profile(path: Path, namespace: str, own_orders: bool) -> None:
+    """
+    Check that a profile is one of a run.
+
+    :param path: of the file.
+    :param namespace: of the run's nodes.
+    :param own_orders: whether it has to hold for orders as well.
+    :raises InputError: if it is not.
+    """
+    covered = _covered(path)
+    if f'{namespace.rstrip("/")}/clock' not in covered:
+        raise InputError(f'is no profile of a run in the namespace {namespace or "/"}', str(path),
+                         'name another file, or the namespace that it was made for')
+    if own_orders and _SERVICE not in covered:
+        raise InputError('was made without --own-orders', str(path), 'name another file')
+
+
+def _covered(path: str | Path) -> set[str]:
+    """Return for what a profile has readers; nothing if it cannot be read."""
+    try:
+        readers = ElementTree.parse(path).getroot().iter(f'{{{_NAMESPACE}}}data_reader')
+    except (OSError, ElementTree.ParseError):
+        return set()
+    return {item.get('profile_name', '') for item in readers}
+
+
 def open_topics(namespace: str, humans: Sequence[str], avs: Sequence[str]) -> list[str]:
     """
     Return those of a run's own topics that this process takes from every program all the same.
@@ -112,11 +138,7 @@ def open_topics(namespace: str, humans: Sequence[str], avs: Sequence[str]) -> li
     path = os.environ.get(PROFILE_VARIABLES[0])
     if not path or is_loopback_profile(path):
         return []
-    try:
-        readers = ElementTree.parse(path).getroot().iter(f'{{{_NAMESPACE}}}data_reader')
-    except (OSError, ElementTree.ParseError):
-        return []
-    covered = {item.get('profile_name', '') for item in readers}
+    covered = _covered(path)
     names = [f'{namespace.rstrip("/")}{topic}' for topic in own_topics(humans, avs)]
     missing = [name for name in names if name not in covered]
     return missing if len(missing) < len(names) else []

@@ -45,6 +45,9 @@ def test_every_argument_reaches_the_launcher(tmp_path: Path) -> None:
         own_orders=True)
     assert parse_arguments(launch_words({'token': 'true', 'listen': '127.0.0.1'})) == RunRequest(
         token=True, listen='127.0.0.1')
+    origins = 'https://a.example', 'http://127.0.0.1:8070'
+    assert parse_arguments(launch_words({'framed_by': ','.join(origins)})) == RunRequest(
+        framed_by=origins)
     assert parse_arguments(launch_words({'open_cockpit': 'true'})) == RunRequest(open_cockpit=True)
     assert parse_arguments(launch_words({})) == RunRequest()
     assert all(argument.what for argument in LAUNCH_ARGUMENTS.values())

@@ -95,6 +95,18 @@ def test_all_in_the_recording_drive_again(record: Any,
     assert (again.seed, again.avs, again.title) == (game.seed, original.setup.game.avs, game.title)
 
 
+def test_options_beside_a_recording(record: Any) -> None:
+    """They hold as with any game: other drivers by name, and no problems where AVs are named."""
+    bag, _ = record(Game(CUT_IN_XML, humans=(HumanSpec('hv0', 'idle'),), avs=(AvSpec('av0'),),
+                         duration=1.5))
+    request = RunRequest(driver=f'replay:{bag}', drivers=(('hv0', 'idle'),))
+    assert [human.driver for human in effective_setup(request).game.humans] == ['idle']
+    for changed, reason in (({'problems': (1,)}, '--problem: the game names its AVs'),
+                            ({'drivers': (('hv7', 'idle'),)}, 'the game has no hv7')):
+        with pytest.raises(InputError, match=reason):
+            effective_setup(replace(request, **changed))
+
+
 def test_the_run_may_be_in_a_later_part(record: Any, tmp_path: Path) -> None:
     """A recorder that was killed at once, and the one that was started again."""
     bag, original = record(Game(CUT_IN_XML, humans=(HumanSpec('hv0', 'idle'),), duration=1.5))
@@ -133,7 +145,8 @@ def test_recording_of_another_scenario_or_rate_is_refused(
     cut_in = str(scenarios_directory() / 'cut_in.yaml')
     for words, expected in (
             ([cut_in], f'{bag}: was recorded in another scenario (ZAM_Over-1_1) than '),
-            (['--scenario', str(CUT_IN_XML)], 'leave the game out: the recording carries its own')
+            (['--scenario', str(CUT_IN_XML)],
+             'leave the game out and give --driver replay:BAG: it carries its own')
     ):
         assert main(['offline', *words, '--driver', f'replay:{bag}']) == 2
         said = capsys.readouterr().err

@@ -21,14 +21,23 @@ def test_a_shell_gets_the_profile_and_others_the_same(
     assert shlex.split(first) == ['export', *(f'{name}={file}' for name in PROFILE_VARIABLES)]
     assert file.stat().st_mode & 0o777 == 0o600
     assert 'profile_name="/exp1/clock"' in text and 'profile_name="/exp1/trigger"' in text
-    assert main(['dds-profile', str(file)]) == 0
+    assert main(['dds-profile', str(file), '--namespace', '/exp1']) == 0
     assert (capsys.readouterr().out, file.read_text()) == (first, text)
+    assert list(file.parent.iterdir()) == [file]
 
 
 def test_what_cannot_be_is_refused_in_a_line(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
         capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / 'fastdds.xml'
+    assert main(['dds-profile', str(file)]) == 0
+    capsys.readouterr()
+    for words, reason in ((['--own-orders'], 'was made without --own-orders'),
+                          (['--namespace', '/exp1'], 'in the namespace /exp1')):
+        assert main(['dds-profile', str(file), *words]) == 2
+        said = capsys.readouterr()
+        assert reason in said.err and not said.out
+    file.unlink()
     assert main(['dds-profile', str(tmp_path / 'none' / 'fastdds.xml')]) == 2
     assert 'cannot be written' in capsys.readouterr().err
     monkeypatch.setenv('RMW_IMPLEMENTATION', 'rmw_cyclonedds_cpp')

@@ -18,6 +18,8 @@ import pytest
      'are directory'),
     ('driver_node', 'qos_overrides./x.publisher.depth:=5 -p vehicel:=hv1',
      'error: command line: there is no parameter "vehicel"; there are joy_map'),
+    ('timesync_node', 'use_sim_time:=true --foo',
+     "error: command line: ROS refuses it: ['--foo']"),
 ])
 def test_a_wrong_parameter_is_refused_in_one_line(node: str, given: str, line: str,
                                                   ros_domain: int) -> None:
