@@ -3,14 +3,20 @@
 """The contract itself: every row agrees with the types it names; its page is up to date."""
 
 from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
 import importlib.util
 from pathlib import Path
 import re
 from types import ModuleType
-from typing import Any
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from crgame_ros.errors import InputError
+from crgame_ros.game.documents import EVENTS, GAME, RUN_STATE, SIGNALS
+from crgame_ros.game.seat_documents import DRIVERS, ORDER, SeatPerson, SEATS
+from crgame_ros.game.task_documents import TASK_LOG, TASK_REPORT, TASK_STATE
+from crgame_ros.game.view_documents import VIEW_PICTURE
 from crgame_ros.messages.contract import load_contract, Topic
+from crgame_ros.messages.instrument_samples import STREAMS, TEXTS
 from crgame_ros.paths import share_directory
 from crgame_ros.ros.endpoints import message_type, qos_profile
 import pytest
@@ -51,6 +57,32 @@ def _walk(message: Any, path: str) -> Iterator[str]:
         if '/' in inner:
             package, name = inner.split('/')
             message = message_type(f'{package}/msg/{name}')
+
+
+def _keys(kind: Any) -> Iterator[str]:
+    """Yield the names of a document's fields, and of those in its parts."""
+    if is_dataclass(kind) and kind is not SeatPerson:
+        hints = get_type_hints(kind)
+        for field in fields(kind):
+            if field.init:
+                yield field.name
+                yield from _keys(hints[field.name])
+    for part in get_args(kind)[:1 if get_origin(kind) is Annotated else None]:
+        yield from _keys(part)
+
+
+# The objects' descriptions are told in words; /seats alone has the keys of a person.
+@pytest.mark.parametrize('document', [
+    GAME, SIGNALS, EVENTS, RUN_STATE, TASK_LOG, TASK_STATE, TASK_REPORT, SEATS, ORDER, DRIVERS,
+    VIEW_PICTURE, STREAMS, TEXTS], ids=lambda document: document.topic)
+def test_every_key_of_a_document_is_in_the_contract(document: Any) -> None:
+    """A game's keys below the first level are in docs/keys.md."""
+    kind = document._kind
+    keys = [field.name for field in fields(kind)] if document is GAME else list(_keys(kind))
+    if document is SEATS:
+        keys += [field.name for field in fields(SeatPerson)]
+    text = CONTRACT.topics[document.topic].fields['data']
+    assert [key for key in keys if not re.search(rf'\b{key}\b', text)] == []
 
 
 def test_the_contract_is_whole() -> None:
