@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of frames: panels at one scale (as CRG figures 8, 10, 12), and an overview of a run."""
+"""Figures of frames: panels at one scale (as CRG figures 8, 10, 12)."""
 
 from collections.abc import Sequence
 from string import ascii_lowercase
@@ -17,20 +17,11 @@ from crgame_ros.analysis.pictures.figure_style import (
     WIDTHS,
 )
 from crgame_ros.analysis.pictures.frame_axes import draw_frame, PLAN_DOT, PLAN_WIDTH, TRACE_WIDTH
-from crgame_ros.analysis.pictures.profiles_figure import (
-    draw_line,
-    draw_over_time,
-    log_times,
-    OVER_TIME,
-)
 from crgame_ros.analysis.pictures.scene_frame import DOTS_S, FrameScene, SceneFrame, TRACE_S
 from crgame_ros.game.objects import Role
-from crgame_ros.recording.run_record import RunRecord
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-import numpy as np
 
 POINTS = 72.0
 # Least size of a metre, if the page is wide enough [pt].
@@ -41,11 +32,6 @@ GAP, LEGEND_LINE = 3.0, 12.0
 MOST_HEIGHT = 9.0
 # Possible lengths of the scale bar [m], and its greatest length [pt].
 _BARS, _BAR = (50, 20, 10, 5, 2, 1), 55.0
-# Height of the panels below, gap between panels, and margin of the page [inch].
-_BELOW, _GAP, _MARGIN = 1.7, 0.04, 0.45
-_POINTS = 72.0
-# Least length of road in a frame [m].
-LEAST = 145.0
 
 
 def frames_figure(scene: FrameScene, ks: Sequence[int], vehicles: Sequence[str] = (),
@@ -154,56 +140,3 @@ def panel_steps(scene: FrameScene, time_s: float, panels: int, spacing_s: float
     begin = scene.k_at(time_s) - panels // 2 * stride
     begin = max(first, min(begin, last - (panels - 1) * stride))
     return tuple(k for k in range(begin, begin + panels * stride, stride) if k <= last)
-
-
-def draw_run(record: RunRecord, times_s: Sequence[float]) -> Figure:
-    """
-    Draw a run over the two columns of a page.
-
-    :param record: record of a recording or an offline run.
-    :param times_s: times of the frames, since the start of the run [s]
-    """
-    scene = FrameScene(record.log)
-    ks = [scene.k_at(time_s) for time_s in times_s]
-    windows = scene.windows([scene.row(k) for k in ks], standing=False, least=LEAST)
-    width = WIDTHS[2]
-    metre = width / windows[0].length
-    height = windows[0].height * metre
-    total = len(ks) * (height + _GAP) + _BELOW
-    with paper_style():
-        figure = new_figure(2, total)
-        figure.set_layout_engine('none')
-        for row, (k, window) in enumerate(zip(ks, windows, strict=True)):
-            axes = figure.add_axes((0.0, 1.0 - ((row + 1) * height + row * _GAP) / total,
-                                    1.0, height / total))
-            frame = scene.at(k, window)
-            draw_frame(axes, frame, metre * _POINTS, f'{frame.time_s:g} s')
-        place = 0.5 * width - _MARGIN - 0.1
-        for number, draw in enumerate((_draw_speeds, _draw_distances)):
-            axes = figure.add_axes(((_MARGIN + 0.5 * number * width) / width, 0.36 / total,
-                                    place / width, (_BELOW - 0.5) / total))
-            draw(axes, record, scene)
-            axes.set_xlabel('time [s]')
-            axes.grid(visible=True)
-            if axes.lines:
-                axes.legend()
-    return figure
-
-
-def _draw_speeds(axes: Axes, record: RunRecord, scene: FrameScene) -> None:
-    draw_over_time(axes, record, scene.styles, *OVER_TIME['velocity'])
-
-
-def _draw_distances(axes: Axes, record: RunRecord, scene: FrameScene) -> None:
-    """Draw the distance between the first human's vehicle and each AV."""
-    log = record.log
-    roles = [item.role for item in log.vehicles]
-    axes.set_ylabel('distance of rear axles [m]')
-    if Role.HUMAN not in roles:
-        return
-    human = roles.index(Role.HUMAN)
-    for i, item in enumerate(log.vehicles):
-        if item.role is Role.AUTONOMOUS:
-            away = log.vehicle_states[:, i, :2] - log.vehicle_states[:, human, :2]
-            draw_line(axes, log_times(record), np.hypot(*away.T), item.id, scene.styles, i)
-    axes.set_xlim(*log_times(record)[[0, -1]])

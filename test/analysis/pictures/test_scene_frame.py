@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 from crgame_ros.analysis.pictures.frame_svg import frame_svg
 from crgame_ros.analysis.pictures.frame_window import FrameWindow, series_windows
-from crgame_ros.analysis.pictures.frames_figure import draw_run, frames_figure, panel_steps
+from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps
 from crgame_ros.analysis.pictures.scene_frame import FollowedPlan, FrameScene
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription
@@ -16,7 +16,6 @@ from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.patches import Polygon
 import numpy as np
 from numpy.typing import NDArray
@@ -209,21 +208,6 @@ def test_strange_names_break_no_svg(cut_in: RunRecord) -> None:
     text = frame_svg(scene.at(int(log.ks[0]), scene.windows([0])[0]))
     texts = [item.text for item in ElementTree.fromstring(text).iter() if item.text]
     assert '<a&"b' in texts
-
-
-def test_a_run_at_a_glance(two_avs: RunRecord) -> None:
-    """Frames with every driven vehicle above, velocities and distances of the log below."""
-    figure = draw_run(two_avs, (2.0, 5.0))
-    log = two_avs.log
-    for axes in figure.axes[:2]:
-        assert set(_drawn(axes, 'body')) >= {'hv0', 'av0', 'av1'}
-        assert any(isinstance(item, LineCollection) for item in axes.collections)
-    speeds, distances = figure.axes[2:]
-    for i, line in enumerate(speeds.lines):
-        assert line.get_ydata() == pytest.approx(log.vehicle_states[:, i, 3])
-    for i, line in enumerate(distances.lines, 1):
-        apart = log.vehicle_states[:, i, :2] - log.vehicle_states[:, 0, :2]
-        assert line.get_ydata() == pytest.approx(np.sqrt((apart**2).sum(axis=1)))
 
 
 def test_a_step_that_is_not_in_the_log_is_refused(cut_in_scene: FrameScene) -> None:
