@@ -13,11 +13,6 @@ DATA_DIRECTORIES = ('launch', 'config', 'examples', 'scenarios', 'msg_defs', 'pa
 # Relative paths only: setuptools refuses absolute ones in data_files.
 ROOT = Path(__file__).resolve().parent
 NODES = tuple(sorted(path.stem for path in (ROOT / PACKAGE / 'nodes').glob('*_node.py')))
-PLANNERS = {'idm': 'idm:IdmPlanner',
-            'idm-package': 'idm_package:IdmPackagePlanner',
-            'reactive': 'reactive:ReactivePlanner',
-            'reactive-package': 'reactive_package:ReactivePackagePlanner',
-            'constant-velocity': 'constant_velocity:ConstantVelocityPlanner'}
 
 
 def data_files() -> list[tuple[str, list[str]]]:
@@ -67,7 +62,5 @@ setup(
             *(f'{name} = {PACKAGE}.nodes.{name}:main' for name in NODES),
             f'crgame = {PACKAGE}.cli:main',
         ],
-        'crgame_ros.planners': [
-            f'{name} = {PACKAGE}.planner.{target}' for name, target in PLANNERS.items()],
     },
 )

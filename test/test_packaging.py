@@ -186,23 +186,16 @@ def test_the_page_is_installed_without_what_checks_it(wheel: Path) -> None:
 
 
 def test_every_entry_point_resolves(wheel: Path) -> None:
-    """Each console script and each built-in planner names something that exists."""
+    """Each console script names something that exists."""
     with ZipFile(wheel) as archive:
         name = next(name for name in archive.namelist() if name.endswith('entry_points.txt'))
         parser = ConfigParser(delimiters=('=',))
         parser.read_string(archive.read(name).decode())
+    assert parser.sections() == ['console_scripts']
     assert set(parser['console_scripts']) == {*NODES, 'crgame'}
-    assert set(parser['crgame_ros.planners']) == {'idm', 'idm-package', 'reactive',
-                                                  'reactive-package', 'constant-velocity'}
-    missing = []
-    for section in parser.sections():
-        for entry, target in parser[section].items():
-            module, _, attribute = target.partition(':')
-            try:
-                getattr(import_module(module), attribute)
-            except (ImportError, AttributeError) as error:
-                missing.append(f'{entry} = {target}: {error}')
-    assert not missing, '\n'.join(missing)
+    for target in parser['console_scripts'].values():
+        module, _, attribute = target.partition(':')
+        assert callable(getattr(import_module(module), attribute))
 
 
 @pytest.mark.parametrize(('name', 'extras'), [
