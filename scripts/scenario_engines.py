@@ -29,7 +29,7 @@ def occluded_pedestrian() -> ScenarioFile:
 
 
 def dense_merge() -> ScenarioFile:
-    """Build a motorway of two lanes with an on-ramp whose lane ends: who is on it has to merge."""
+    """Build a motorway of two lanes with an on-ramp whose lane ends; agents have to merge."""
     roads = RoadMap()
     curve = clothoids((-500.0, 0.0, 0.0), [
         (900.0, 0.0), (120.0, 1 / 900), (480.0, 1 / 900), (100.0, 0.0)], 1.9)
@@ -49,10 +49,8 @@ def dense_merge() -> ScenarioFile:
     roads.chain(51, 52)
     roads.speed_limit(80 * KMH, 51)
     roads.speed_limit(100 * KMH, 52)
-    problems = (
-        Problem(PLANNING_PROBLEM_ID, roads.lanelets[11].pose_at(330.0), 22.0, (31,)),
-        Problem(PLANNING_PROBLEM_ID + 1, roads.lanelets[51].pose_at(330.0), 20.0, (31, 32)))
-    return ScenarioFile('ZAM_DenseMerge-1_1_T-1', roads, problems,
+    problem = Problem(PLANNING_PROBLEM_ID, roads.lanelets[11].pose_at(330.0), 22.0, (31,))
+    return ScenarioFile('ZAM_DenseMerge-1_1_T-1', roads, (problem,),
                         ('interstate', 'slip_road', 'merging_lanes', 'multi_lane', 'simulated'))
 
 

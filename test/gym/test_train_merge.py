@@ -21,12 +21,9 @@ ROOT = Path(__file__).resolve().parents[2]
 @pytest.fixture
 def example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """Return a copy of the example, as a module."""
-    folder = tmp_path / 'examples'
-    folder.mkdir()
-    (tmp_path / 'scenarios').symlink_to(ROOT / 'scenarios')
-    for name in ('train_merge.py', 'train_merge.yaml'):
-        shutil.copy(ROOT / 'examples' / name, folder)
-    spec = importlib.util.spec_from_file_location('train_merge', folder / 'train_merge.py')
+    for name in ('train_merge.py', 'train_merge.yaml', 'ZAM_DenseMerge-1_2_T-1.xml'):
+        shutil.copy(ROOT / 'examples' / name, tmp_path)
+    spec = importlib.util.spec_from_file_location('train_merge', tmp_path / 'train_merge.py')
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, 'train_merge', module)
@@ -60,15 +57,15 @@ def test_equal_steps_and_seeds_give_equal_weights_that_drive_a_run(
         monkeypatch.setattr(sys, 'argv', ['train_merge.py', '--steps', '30', '--tests', '2',
                                           '--cores', cores])
         assert example.main() == 0
-        found.append(np.load(tmp_path / 'examples' / 'trained_merge.npz')['weights'])
+        found.append(np.load(tmp_path / 'trained_merge.npz')['weights'])
     assert found[0].shape == (4,)
     assert found[0].tobytes() == found[1].tobytes()
-    assert (tmp_path / 'examples' / 'trained_merge.png').stat().st_size > 5000
+    assert (tmp_path / 'trained_merge.png').stat().st_size > 5000
     said = capsys.readouterr().out
     assert 'generation 1: ' in said and ' of 2 merged (' in said
-    game = load_game(tmp_path / 'examples' / 'train_merge.yaml')
+    game = load_game(tmp_path / 'train_merge.yaml')
     assert game.avs is not None
     game = replace(game, avs=(replace(
-        game.avs[0], planner=f'policy:{tmp_path / "examples" / "train_merge.py"}:load'),))
+        game.avs[0], planner=f'policy:{tmp_path / "train_merge.py"}:load'),))
     record = run_offline(build_setup(game), duration_s=2.0).planners['av0']
     assert (record.statistics.fallbacks, record.counters.accepted) == (0, 20)

@@ -7,6 +7,7 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
+from crgame_ros.driver.source import DriverSource
 from crgame_ros.game.game import parse_game
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.paths import scenarios_directory
@@ -68,7 +69,7 @@ def game(planner: str, events: Any = (), **av: Any) -> Setup:
     return build_setup(parse_game(values, 'cut_in', scenarios_directory()))
 
 
-class Indicating:
+class Indicating(DriverSource):
     """A driver that only moves the lever, from 1 s on."""
 
     def __init__(self, lights: int) -> None:

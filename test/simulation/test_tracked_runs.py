@@ -103,7 +103,7 @@ def test_the_lane_is_either_of_a_route_that_changes_lanes() -> None:
     """Before, during and after the change the AV is never half a lane away from both."""
     setup = tracked('cut_in')
     roads, av = setup.network, setup.avs[0]
-    lane, _ = start_lanelet(roads, *av.state[:3])
+    lane, begin = start_lanelet(roads, *av.state[:3])
     beside = roads.left_of(roads.straightest_successor(lane))
     assert beside is not None
     given = av.planning_problem
@@ -113,8 +113,8 @@ def test_the_lane_is_either_of_a_route_that_changes_lanes() -> None:
     width = roads.width_at(lane, 10.0)
     for across, expected in ((0.0, 0.0), (0.3 * width, 0.3 * width), (width, 0.0),
                              (1.2 * width, 0.2 * width), (-1.0, -1.0)):
-        # Beside the goal's lanelet, which the change has to reach; the road runs along x.
-        x, y, _ = roads.pose_on(roads.straightest_successor(lane), 5.0)
+        # On the lanelet of the start, from which the change leads; the road runs along x.
+        x, y, _ = roads.pose_on(lane, begin + 5.0)
         route_lane.measure(av.state._replace(x=x, y=y + across))
         assert route_lane.error == pytest.approx(expected, abs=0.05)
     assert route_lane.worst == pytest.approx(max(0.3 * width, 1.0), abs=0.05)
