@@ -54,8 +54,6 @@ MERGED, SLOWEST = 'merged', 2.0
 # Each generation draws so many weights, drives each from so many starts, and keeps the best few;
 # the first one looks everywhere, later ones tell good from better. The last one is repeated.
 GENERATIONS = ((32, 2, 8), (24, 4, 6), (16, 8, 5), (12, 12, 4), (12, 16, 4))
-# What is written is the mean over the last generations: one alone has few drives to judge by.
-AVERAGED = 3
 # How far the weights of the first generation are spread; later ones by that of the best and this.
 SPREAD, MORE, LESS_EACH = 0.8, 0.3, 0.8
 WEIGHT_COUNT = 4
@@ -213,7 +211,6 @@ def train(minutes: float, steps: int | None, seed: int, cores: int) -> tuple[Arr
     rows = list[tuple[float, int, float]]()
     random = np.random.default_rng(seed)
     mean, spread = np.zeros(WEIGHT_COUNT), np.full(WEIGHT_COUNT, SPREAD)
-    means = list[Array]()
     with multiprocessing.get_context('fork').Pool(cores, _begin, (WORLDS,)) as pool:
         while True:
             draws, count, best = sizes_of(len(rows))
@@ -225,7 +222,6 @@ def train(minutes: float, steps: int | None, seed: int, cores: int) -> tuple[Arr
             scores = np.array([item.total for item in drives]).reshape(draws, count).mean(axis=1)
             kept = drawn[np.argsort(-scores, kind='stable')[:best]]
             mean = kept.mean(axis=0)
-            means.append(mean)
             spread = kept.std(axis=0) + MORE * LESS_EACH ** len(rows)
             decisions += sum(item.decisions for item in drives)
             spent_s = time.monotonic() - began_s
@@ -236,7 +232,7 @@ def train(minutes: float, steps: int | None, seed: int, cores: int) -> tuple[Arr
             # Another generation has to fit into the time.
             next_s = spent_s / driven * math.prod(sizes_of(len(rows))[:2])
             if decisions >= steps if steps is not None else spent_s + next_s > 60.0 * minutes:
-                return np.mean(means[-AVERAGED:], axis=0), np.array(rows)
+                return mean, np.array(rows)
 
 
 def by_planner(planner: str, seed: int) -> str:
