@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import hashlib
 import hmac
 import json
-import math
 import secrets
 from types import MappingProxyType
 
@@ -15,6 +14,7 @@ from crgame_ros.analysis.criticality.criticality import EXPOSURES
 from crgame_ros.analysis.criticality.rows import MEASURED
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.cockpit.client import Client
+from crgame_ros.cockpit.finite_json import finite
 from crgame_ros.cockpit.rights import ALL_RIGHTS, Rights
 from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.version import __version__
@@ -220,15 +220,5 @@ def _encode(kind: str, content: Mapping[str, object]) -> bytes:
         text = json.dumps(message, allow_nan=False, separators=(',', ':'))
     except ValueError:
         # JSON has no NaN and no infinity.
-        text = json.dumps(_finite(message), allow_nan=False, separators=(',', ':'))
+        text = json.dumps(finite(message), allow_nan=False, separators=(',', ':'))
     return without_paths(text).encode()
-
-
-def _finite(value: object) -> object:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return value

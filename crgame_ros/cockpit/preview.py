@@ -8,8 +8,9 @@ from dataclasses import replace
 import json
 from pathlib import Path
 
+from crgame_ros.cockpit.finite_json import finite
 from crgame_ros.cockpit.job_process import serve_jobs
-from crgame_ros.cockpit.scene import finite, scene_document
+from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError

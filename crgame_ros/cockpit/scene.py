@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scene document: everything on the page that does not change during a run."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 import math
 from typing import Any
@@ -12,6 +12,7 @@ from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking
 from commonroad.scenario.traffic_light import TrafficLight
 from commonroad.scenario.traffic_sign import TrafficSign
+from crgame_ros.cockpit.finite_json import finite
 from crgame_ros.game.documents import document_entry, DrivenVehicle, GameDocument
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import PerceptionSpec
@@ -315,14 +316,3 @@ def _bounds(network: LaneletNetwork, game: GameDocument) -> list[float]:
         points = [vehicles.reshape(-1, 2) - _EMPTY_MARGIN, vehicles.reshape(-1, 2) + _EMPTY_MARGIN]
     together = np.concatenate(points)
     return flat(np.array([together.min(axis=0), together.max(axis=0)]))
-
-
-def finite(value: object) -> object:
-    """Replace NaN and infinities, which JSON does not have, by null."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {str(key): finite(entry) for key, entry in value.items()}
-    if isinstance(value, Iterable) and not isinstance(value, str):
-        return [finite(entry) for entry in value]
-    return value

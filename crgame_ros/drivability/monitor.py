@@ -218,17 +218,6 @@ class DrivabilityMonitor:
         return x, y, yaw
 
 
-def road_transforms(humans: int, avs: Sequence[RigidTransform]) -> tuple[RigidTransform, ...]:
-    """
-    Return the transform with which each driven vehicle is checked against the road (CRG 28).
-
-    An AV has its own; humans use that of the first AV, because the paper has only one AV.
-
-    :return: transforms of the humans, then of the AVs.
-    """
-    return (*[avs[0] if avs else RigidTransform()] * humans, *avs)
-
-
 def changes(previous: Sequence[VehicleDrivability], current: Sequence[VehicleDrivability]
             ) -> tuple[VehicleDrivability, ...]:
     """

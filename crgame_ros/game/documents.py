@@ -34,7 +34,7 @@ from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.game.task_spec import TaskList, TaskSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.geometry.rigid_transform import RigidTransform, road_transforms
 from crgame_ros.schema.document_marks import Bounded, Declared, Derived, Row
 from crgame_ros.schema.json_documents import JsonDocument
 from crgame_ros.schema.writing import write
@@ -201,6 +201,11 @@ class GameDocument:
     def vehicles(self) -> tuple[DrivenVehicle, ...]:
         """Return all driven vehicles, in the order of `/vehicles/state`."""
         return (*self.humans, *self.avs)
+
+    @property
+    def road_transforms(self) -> tuple[RigidTransform, ...]:
+        """Return the transform of each driven vehicle to the road's coordinates (CRG 28)."""
+        return road_transforms(len(self.humans), [av.transform for av in self.avs])
 
     @property
     def gaze_seats(self) -> tuple[str, ...]:

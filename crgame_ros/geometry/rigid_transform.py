@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rigid transform between simulation and scenario coordinates (CRG 6-10)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
@@ -68,3 +69,14 @@ class RigidTransform:
         x, y = poses[..., 0] - self.offset_x, poses[..., 1] - self.offset_y
         return np.stack((cos * x + sin * y, -sin * x + cos * y,
                          wrap_pi_array(poses[..., 2] - self.yaw_offset)), axis=-1)
+
+
+def road_transforms(humans: int, avs: Sequence[RigidTransform]) -> tuple[RigidTransform, ...]:
+    """
+    Return the transform with which each driven vehicle is checked against the road (CRG 28).
+
+    An AV has its own; humans use that of the first AV, because the paper has only one AV.
+
+    :return: transforms of the humans, then of the AVs.
+    """
+    return (*[avs[0] if avs else RigidTransform()] * humans, *avs)

@@ -4,11 +4,10 @@
 
 from crgame_ros.messages.joints import plan_to_joints
 from crgame_ros.messages.plan import Plan
-from crgame_ros.perception.perception import Perception
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.policy.seat_view import RequestView, SeatView, Surrounded
-from crgame_ros.simulation.av_models import published_states
 from crgame_ros.simulation.engine import Simulation, StepResult
+from crgame_ros.simulation.offline import perception_of
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
 import numpy as np
@@ -33,20 +32,15 @@ class AvPilot:
         av = setup.avs[index]
         self.id = av.id
         self._simulation, self._av, self._view = simulation, simulation.avs[index], view
-        self.perception: Perception | None = None
+        self.perception = perception_of(setup, index)
         self.around: Surrounded
         self._stamp_ns = 0
-        if av.spec.perception is None:
+        if self.perception is None:
             self._av.planner_running = False
             return
         objects = {item.id: item for item in setup.descriptions}
         self._reader = RequestReader(av.id, objects, simulation.scheduler)
         self._request_view = RequestView(av.id, objects)
-        initial = published_states([av.state])[0]
-        self.perception = Perception(
-            av.id, av.spec.perception, setup.descriptions, av.vehicle, av.transform,
-            VehicleState(*initial.tolist()), setup.game.seed, simulation.scheduler.dt_s,
-            setup.open_occupancy())
 
     def observe(self, result: StepResult, states: NDArray[np.float64]) -> Surrounded:
         """

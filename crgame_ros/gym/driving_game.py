@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from crgame_ros.drivability.collision import CIRCLE_SLACK, PERMANENT_OBSTACLE, PermanentObstacles
-from crgame_ros.drivability.monitor import road_transforms
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import DrivenHuman
@@ -14,6 +13,7 @@ from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.outline import Footprint, Primitive
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.gym.av_pilot import AvPilot, stacked
+from crgame_ros.gym.episode_setups import check_count
 from crgame_ros.gym.reward import GoalWatch
 from crgame_ros.planner.plan_check import TOLERANCE
 from crgame_ros.policy.actions import (
@@ -195,13 +195,12 @@ class DrivingGame:
     def __init__(self, setup: Setup, seats: Sequence[str], action: ActionKind, ticks: int) -> None:
         self._action, self._ticks = action, ticks
         ids, driven = setup.vehicle_ids, setup.vehicle_descriptions
-        transforms = road_transforms(len(setup.humans), [av.transform for av in setup.avs])
-        self._transforms = transforms
+        self._transforms = setup.road_transforms
         self._to_center = np.array([item.rear_to_center for item in driven])
-        if not (isinstance(ticks, int | np.integer) and ticks >= 1) or (
-                action == 'plan' and ticks > 1):
-            raise InputError(f'"ticks" is {ticks!r}', 'environment',
-                             'give 1 for plans, else a whole number from 1')
+        remedy = 'give 1 for plans, else a whole number from 1'
+        check_count('ticks', ticks, remedy)
+        if action == 'plan' and ticks > 1:
+            raise InputError(f'"ticks" is {ticks!r}', 'environment', remedy)
         self.seats: list[AgentSeat] = []
         for name in seats:
             if name not in ids:

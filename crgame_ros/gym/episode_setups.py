@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import math
 from typing import Annotated, ClassVar, TypeVar
 
-from crgame_ros.drivability.monitor import road_transforms
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import DrivenHuman
 from crgame_ros.game.game import Game
@@ -44,6 +43,12 @@ class StartVariation:
     along: Annotated[float, Within(0.0, 100.0)] = 0.0
 
 
+def check_count(name: str, value: object, remedy: str = 'give a whole number from 1') -> None:
+    """Refuse a keyword of an environment that is no whole number from 1."""
+    if not (isinstance(value, int | np.integer) and value >= 1):
+        raise InputError(f'"{name}" is {value!r}', 'environment', remedy)
+
+
 class EpisodeSetups:
     """
     A factory of episodes' setups from their seeds.
@@ -57,9 +62,8 @@ class EpisodeSetups:
 
     def __init__(self, game: Game, vary: StartVariation, worlds: int | None = None,
                  loaded: LoadedScenario | None = None) -> None:
-        if worlds is not None and not (isinstance(worlds, int | np.integer) and worlds >= 1):
-            raise InputError(f'"worlds" is {worlds!r}', 'environment',
-                             'give a whole number from 1')
+        if worlds is not None:
+            check_count('worlds', worlds)
         self.base = build_setup(game, loaded)
         self._vary, self._worlds = vary, worlds
         self._placed: dict[int, Setup] = {}
@@ -90,8 +94,7 @@ class EpisodeSetups:
         changes = {vehicle: (start.speed, start.along) if start is not None else tuple(
             share * size for share, size in zip(random.uniform(-1.0, 1.0, 2).tolist(), most,
                                                 strict=True)) for vehicle in guides}
-        transforms = dict(zip(setup.vehicle_ids, road_transforms(
-            len(setup.humans), [av.transform for av in setup.avs]), strict=True))
+        transforms = dict(zip(setup.vehicle_ids, setup.road_transforms, strict=True))
 
         def varied(vehicle: Vehicle) -> Vehicle:
             if vehicle.id not in guides:

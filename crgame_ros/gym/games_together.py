@@ -10,7 +10,7 @@ from crgame_ros.gym.agent_game import AgentGame, Episodes, make_experiment, obse
 from crgame_ros.gym.agent_spaces import action_space, observation_space
 from crgame_ros.gym.driving_env import check_render_mode, Seen
 from crgame_ros.gym.episode_options import EpisodeOptions, read_options
-from crgame_ros.gym.episode_setups import SEEDS
+from crgame_ros.gym.episode_setups import check_count, SEEDS
 from crgame_ros.gym.scene_painter import FRAMES_PER_S
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -41,9 +41,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
     def __init__(self, num_envs: int = 1, seat: str = 'av0', render_mode: str | None = None,
                  **keywords: Any) -> None:
         check_render_mode(render_mode, self.metadata['render_modes'])
-        if not (isinstance(num_envs, int | np.integer) and num_envs >= 1):
-            raise InputError(f'"num_envs" is {num_envs!r}', 'environment',
-                             'give a whole number from 1')
+        check_count('num_envs', num_envs)
         self.num_envs, self.render_mode = num_envs, render_mode
         self.experiment = make_experiment((seat,), **keywords)
         self._episodes = [Episodes(self.experiment) for _ in range(num_envs)]

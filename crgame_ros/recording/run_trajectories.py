@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from crgame_ros.drivability.monitor import road_transforms
 from crgame_ros.errors import InputError, one_line
 from crgame_ros.game.documents import GAME, GameDocument
 from crgame_ros.game.objects import ObjectDescription
@@ -94,7 +93,7 @@ class RunTrajectories:
     @property
     def road_transforms(self) -> tuple[RigidTransform, ...]:
         """Return the transform of each driven vehicle to the road's coordinates (CRG 28)."""
-        return road_transforms(len(self.game.humans), [av.transform for av in self.game.avs])
+        return self.game.road_transforms
 
     @property
     def finite_vehicle_states(self) -> FloatArray:

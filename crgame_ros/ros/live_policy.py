@@ -4,7 +4,6 @@
 
 from collections.abc import Callable
 
-from crgame_ros.drivability.monitor import road_transforms
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.policy.driver import DrivenSeat, PolicyDriver
@@ -111,7 +110,6 @@ class LivePolicyDriver(DriverSource):
         if human is None:
             return
         row = ids.index(human.id)
-        transforms = road_transforms(len(game.humans), [av.transform for av in game.avs])
         self._driver = PolicyDriver(self._policy, DrivenSeat(
             row, scenario.driven, scenario.others, scenario.loaded.scenario, human.vehicle,
-            human.state, transforms[row], game.scheduler.steps_per_tick))
+            human.state, game.road_transforms[row], game.scheduler.steps_per_tick))

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from commonroad.planning.planning_problem import PlanningProblem
-from crgame_ros.drivability.monitor import DrivabilityMonitor, road_transforms
+from crgame_ros.drivability.monitor import DrivabilityMonitor
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.game import DrivabilitySpec
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
-from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.geometry.rigid_transform import RigidTransform, road_transforms
 from crgame_ros.occupancy.occupancy import OccupancyMap
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.vehicle.state import STATE_WIDTH

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from crgame_ros.control.tracked_execution import TrackingErrors
-from crgame_ros.drivability.monitor import road_transforms, VehicleDrivability
+from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.driver.source import DriverSource, IdleDriver, parse_source, ScriptedDriver
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import FiredEvent
@@ -49,11 +49,10 @@ def offline_driver(setup: Setup, index: int) -> DriverSource:
         # Few games have a policy driver; the others should not wait for its imports.
         from crgame_ros.policy.driver import DrivenSeat, PolicyDriver
         from crgame_ros.policy.policy_file import load_policy
-        transforms = road_transforms(len(setup.humans), [av.transform for av in setup.avs])
         return PolicyDriver(load_policy(source.argument, human.id), DrivenSeat(
             index, setup.vehicle_descriptions, setup.obstacles.descriptions,
-            setup.loaded.scenario, human.vehicle, human.state, transforms[index],
-            setup.scheduler.steps_per_tick))
+            setup.loaded.scenario, human.vehicle, human.state,
+            setup.road_transforms[index], setup.scheduler.steps_per_tick))
     raise InputError(f'driver "{human.driver}" needs a person or a device', human.id,
                      'offline, use keys:FILE, joy:FILE, policy:FILE.py:load, replay:BAG or idle')
 
@@ -134,6 +133,18 @@ class OfflineResult:
         return self.vehicle_states[:, self.setup.vehicle_ids.index(vehicle_id)]
 
 
+def perception_of(setup: Setup, index: int) -> Perception | None:
+    """Return the perception of an AV as it begins in a run; None if the game gives it none."""
+    av = setup.avs[index]
+    if av.spec.perception is None:
+        return None
+    initial = published_states([av.state])[0]
+    return Perception(
+        av.id, av.spec.perception, setup.descriptions, av.vehicle, av.transform,
+        VehicleState(*initial.tolist()), setup.game.seed, setup.scheduler.dt_s,
+        setup.open_occupancy())
+
+
 class PlannerSeat:
     """One AV's planner in process, answering a stated number of steps late."""
 
@@ -159,13 +170,7 @@ class PlannerSeat:
             context, av.spec.planner, av.spec.options, setup.game.events, clock_s)
         self._failures = FailureLines(av.id, say, setup.scheduler.time_step_s)
         self._failures.note(self.manager)
-        self.perception: Perception | None = None
-        if av.spec.perception is not None:
-            initial = published_states([av.state])[0]
-            self.perception = Perception(
-                av.id, av.spec.perception, setup.descriptions, av.vehicle, av.transform,
-                VehicleState(*initial.tolist()), setup.game.seed, simulation.scheduler.dt_s,
-                setup.open_occupancy())
+        self.perception = perception_of(setup, av_index)
 
     def proceed(self, result: StepResult) -> None:
         """Process the result of a step, and deliver the due answers."""

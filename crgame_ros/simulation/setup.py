@@ -17,7 +17,7 @@ from crgame_ros.game.documents import DrivenHuman
 from crgame_ros.game.game import AvSpec, Game
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
-from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.geometry.rigid_transform import RigidTransform, road_transforms
 from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.paths import expanded
 from crgame_ros.registry import POLICY
@@ -149,6 +149,11 @@ class Setup:
     def vehicles(self) -> tuple[DrivenHuman | AvSetup, ...]:
         """Return the driven vehicles: humans, then AVs."""
         return (*self.humans, *self.avs)
+
+    @property
+    def road_transforms(self) -> tuple[RigidTransform, ...]:
+        """Return the transform of each driven vehicle to the road's coordinates (CRG 28)."""
+        return road_transforms(len(self.humans), [av.transform for av in self.avs])
 
     @property
     def vehicle_ids(self) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.geometry.outline import placed_polygon
-from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
+from crgame_ros.geometry.rigid_transform import Pose
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.setup import Setup
@@ -95,16 +95,9 @@ class PutBack:
             return self._tried[index][1]
         return ((place, self._room(index, place)) for place in self._places(index, now))
 
-    def _transform(self, index: int) -> RigidTransform:
-        """Return the vehicle's transform to the road's coordinates (CRG 28)."""
-        avs, humans = self._setup.avs, len(self._setup.humans)
-        if index >= humans:
-            return avs[index - humans].transform
-        return avs[0].transform if avs else RigidTransform()
-
     def _places(self, index: int, now: VehicleState) -> Iterator[Place]:
         """Yield poses of the rear axle on the lane, in simulation coordinates, best first."""
-        network, transform = self._setup.network, self._transform(index)
+        network, transform = self._setup.network, self._setup.road_transforms[index]
         x, y, yaw = transform.to_scenario(np.array(now[:3])).tolist()
         lane = self._lane(x, y, yaw)
         s = min(max(network.locate(lane, x, y)[0], 0.0), network.line(lane).length)

@@ -166,7 +166,7 @@ def plan_trials(study: StudyFile, place: int, group: str = '') -> tuple[PlannedT
         sequences = _sequences(block, [condition.name for condition in conditions])
         in_block = 0
         # Blocks with equally many conditions have orders of their own.
-        seed = ' '.join((str(study.seed), *((block.name,) if block != study.blocks[0] else ())))
+        seed = f'{study.seed}' if block is study.blocks[0] else f'{study.seed} {block.name}'
         for repetition in range(block.repetitions):
             for index in order_of(block.order, len(conditions), seed, in_turn, repetition,
                                   sequences, group):

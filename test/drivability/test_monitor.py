@@ -9,13 +9,12 @@ from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from crgame_ros.drivability.monitor import (
     changes,
     DrivabilityMonitor,
-    road_transforms,
     VehicleDrivability,
 )
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import DrivabilitySpec
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
-from crgame_ros.geometry.rigid_transform import RigidTransform
+from crgame_ros.geometry.rigid_transform import RigidTransform, road_transforms
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 import numpy as np

@@ -44,9 +44,18 @@ class SameGap(FreeDriving):
         return 5.0
 
 
+class SameGaps(FreeDriving):
+    """The same, with an entry for each agent."""
+
+    def desired_gap(self, speed: np.ndarray) -> np.ndarray:
+        return np.full_like(speed, 5.0)
+
+
 def test_a_law_may_have_one_gap_for_all(maps: Path) -> None:
-    spec = TrafficSpec(agents=25, flow=500.0, model=f'{__file__}:SameGap')
-    support.Run(maps / MERGE, spec, 0).ticks(100)
+    one, each = (support.Run(maps / MERGE, TrafficSpec(
+        agents=25, flow=500.0, model=f'{__file__}:{name}'), 0).ticks(100)
+        for name in ('SameGap', 'SameGaps'))
+    assert [poses.tobytes() for poses in one.poses] == [poses.tobytes() for poses in each.poses]
 
 
 def test_without_car_following_they_do_hit(maps: Path) -> None:

@@ -100,7 +100,7 @@ def find_leader(seen: SeenPath, others: FloatArray, radii: FloatArray,
     places = np.concatenate((centers[candidates, None], others[candidates]), axis=1)
     positions = places.reshape(-1, 2)
     along, aside = (each.reshape(places.shape[:2])
-                    for each in path.refined(positions, path.near(positions, seen.rows)[1]))
+                    for each in path.refined(positions, path.guess(positions, seen.rows)))
     rears, right, left = (along[:, 1:].min(axis=1), aside[:, 1:].min(axis=1),
                           aside[:, 1:].max(axis=1))
     # A vehicle that is passed closely is not in the way.

@@ -68,6 +68,11 @@ class OwnPath(NamedTuple):
         dx, dy = (positions - self.samples.take(row, 0)).T
         return np.asarray(np.sqrt(dx * dx + dy * dy)), self._spacing * row.astype(np.float64)
 
+    def guess(self, positions: FloatArray, rows: slice) -> FloatArray:
+        """Return the arc lengths alone that `near` returns, (N) [m]."""
+        row = nearest(positions, self.samples[rows]) + rows.start
+        return self._spacing * row.astype(np.float64)
+
     @property
     def _spacing(self) -> float:
         return self.line.length / (len(self.samples) - 1)
