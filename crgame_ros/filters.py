@@ -16,25 +16,27 @@ FloatArray = NDArray[np.float64]
 PADDING = 9
 
 
-def smoothed_derivative(values: FloatArray, dt_s: float, window: int, order: int) -> FloatArray:
+def smoothed(values: FloatArray, window: int, degree: int, order: int = 0) -> FloatArray:
     """
-    Smooth a signal by parabolas and differentiate it (Savitzky and Golay 1964).
+    Smooth a signal by polynomials and differentiate it (Savitzky and Golay 1964).
 
-    :param values: (N) samples, dt apart.
-    :param window: odd number of samples that a parabola is fitted to, 3 to N; the first and the
-        last of them serve for the samples at the ends.
-    :param order: of the derivative, 0 to 2.
+    :param values: (N) samples.
+    :param window: odd number of samples that a polynomial is fitted to, degree + 1 to N; the first
+        and the last of them serve for the samples at the ends.
+    :param degree: of the polynomials.
+    :param order: of the derivative by the number of the sample, 0 to degree.
     :return: (N)
     """
     half = window // 2
-    fit = np.linalg.pinv(np.vander(np.arange(-half, half + 1.0), 3, increasing=True))
-    parabolas = np.lib.stride_tricks.sliding_window_view(values, window) @ fit.T
+    fit = np.linalg.pinv(np.vander(np.arange(-half, half + 1.0), degree + 1, increasing=True))
+    polynomials = np.lib.stride_tricks.sliding_window_view(values, window) @ fit.T
     samples = np.arange(len(values))
-    chosen = np.clip(samples - half, 0, len(parabolas) - 1)
+    chosen = np.clip(samples - half, 0, len(polynomials) - 1)
     x = samples - half - chosen
-    constant, slope, bend = parabolas[chosen].T
-    derivatives = (constant + (slope + bend * x) * x, slope + 2.0 * bend * x, 2.0 * bend)
-    return np.asarray(derivatives[order] / dt_s ** order)
+    result = np.zeros(len(values))
+    for power in range(degree, order - 1, -1):
+        result = result * x + math.perm(power, order) * polynomials[chosen, power]
+    return result
 
 
 def low_passed(values: FloatArray, dt_s: float, cutoff_hz: float) -> FloatArray:

@@ -2,19 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The filters give what scipy.signal gives."""
 
-from crgame_ros.filters import low_passed, PADDING, smoothed_derivative
+from crgame_ros.filters import low_passed, PADDING, smoothed
 import numpy as np
 import pytest
 from scipy.signal import butter, filtfilt, savgol_filter
 
 
 @pytest.mark.parametrize('order', [0, 1, 2])
-@pytest.mark.parametrize(('count', 'window'), [(3, 3), (16, 5), (16, 15), (15, 15), (200, 7)])
-def test_derivatives(count: int, window: int, order: int) -> None:
+@pytest.mark.parametrize(('count', 'window', 'degree'), [
+    (3, 3, 2), (16, 5, 2), (16, 15, 2), (15, 15, 3), (200, 7, 2), (200, 15, 3), (5, 5, 3)])
+def test_smoothed(count: int, window: int, degree: int, order: int) -> None:
     values = np.random.default_rng(count).normal(size=count).cumsum()
-    expected = savgol_filter(values, window, 2, deriv=order, delta=0.1)
-    found = smoothed_derivative(values, 0.1, window, order)
-    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
+    expected = savgol_filter(values, window, degree, deriv=order)
+    np.testing.assert_allclose(
+        smoothed(values, window, degree, order), expected, rtol=0.0, atol=1e-11)
 
 
 @pytest.mark.parametrize('count', [PADDING + 1, 64, 4000])

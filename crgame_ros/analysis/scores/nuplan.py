@@ -25,7 +25,7 @@ from crgame_ros.analysis.scores.route_progress import (
 )
 from crgame_ros.analysis.scores.scored_drive import ScoredDrive, Track, TrackKind
 from crgame_ros.errors import InputError
-from crgame_ros.filters import smoothed_derivative
+from crgame_ros.filters import smoothed
 from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.roads.boundary import RoadBoundary
 from crgame_ros.roads.network import RoadNetwork
@@ -181,7 +181,7 @@ def _filtered(values: FloatArray, dt_s: float, samples: int, order: int) -> Floa
     window = max(LEAST_STEPS, round(samples * _SAMPLE_S / dt_s))
     window = min(window, len(values))
     window -= window % 2 == 0
-    return smoothed_derivative(values, dt_s, window, order)
+    return smoothed(values, window, 2, order) / dt_s ** order
 
 
 class SpeedCompliance(NamedTuple):
