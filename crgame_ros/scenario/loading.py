@@ -11,7 +11,7 @@ there, and commonroad-io preserves it on reading and writing, unlike comments.
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 import hashlib
 import logging
@@ -148,15 +148,26 @@ def parse_scenario(xml_text: str, source: str) -> LoadedScenario:
     :param source: file name or topic for messages
     :raises InputError: naming file, element and remedy, if it cannot be used.
     """
-    return pickle.loads(_pickled(xml_text, source))
+    loaded = pickle.loads(_pickled(_Text(xml_text, source)))
+    return replace(loaded, source=source, notices=tuple(
+        one_line(f'{source}: {notice}') for notice in loaded.notices))
+
+
+@dataclass(frozen=True)
+class _Text:
+    """A text to load; the same one from elsewhere, as from a recording, is equal."""
+
+    xml: str
+    source: str = field(compare=False)
 
 
 @lru_cache(_KEPT)
-def _pickled(xml_text: str, source: str) -> bytes:
-    return pickle.dumps(_parsed(xml_text, source), pickle.HIGHEST_PROTOCOL)
+def _pickled(text: _Text) -> bytes:
+    return pickle.dumps(_parsed(text.xml, text.source), pickle.HIGHEST_PROTOCOL)
 
 
 def _parsed(xml_text: str, source: str) -> LoadedScenario:
+    """Load a scenario with notices that do not name its source yet."""
     root = guard.parse_hardened(xml_text, source)
     notices = upgrade(root) + mend_places(root)
     guard.refuse_malformed(root, source)
@@ -186,8 +197,7 @@ def _parsed(xml_text: str, source: str) -> LoadedScenario:
         notices.append('the scenario has no planning problem: the human drives alone')
     digest = scenario_digest(xml_text)
     return LoadedScenario(scenario, exact, xml_text, digest, str(scenario.scenario_id),
-                          float(scenario.dt), tuple(one_line(f'{source}: {n}') for n in notices),
-                          source, heights)
+                          float(scenario.dt), tuple(notices), source, heights)
 
 
 def _is_tangled(lanelet: Lanelet) -> bool:

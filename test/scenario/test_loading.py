@@ -272,4 +272,7 @@ def test_each_load_of_a_text_gives_a_scenario_of_its_own() -> None:
     assert [lanelet.lanelet_id for lanelet in lanelets] == [1, 2]
     assert lanelets[0].left_vertices.tolist() == [[0.0, 2.0], [50.0, 2.0]]
     assert again.notices == first.notices
-    assert parse_scenario(write(), 'b').source == 'b'
+    elsewhere = parse_scenario(write(), 'b')
+    assert elsewhere.source == 'b'
+    assert elsewhere.notices == tuple(
+        notice.replace('a file: ', 'b: ') for notice in first.notices) != first.notices
