@@ -31,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parse_arguments(['--help'])
     from crgame_ros.launcher.interruption import print_now
     from crgame_ros.launcher.launch import launch
-    from crgame_ros.ros.node_main import end_with_parent
+    from crgame_ros.processes import end_with_parent
     end_with_parent()
     signal.signal(signal.SIGINT, before)
     try:

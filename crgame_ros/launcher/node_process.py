@@ -22,13 +22,8 @@ import traceback
 from typing import NoReturn
 
 from crgame_ros.launcher.interruption import ENDING
-from crgame_ros.ros.node_main import (
-    die_with_parent,
-    name_process,
-    NICE_VARIABLE,
-    PARENT_VARIABLE,
-    TELL_WHERE,
-)
+from crgame_ros.processes import name_process, PARENT_VARIABLE
+from crgame_ros.ros.node_main import die_with_parent, NICE_VARIABLE, TELL_WHERE
 
 MAX_LINE = 10_000
 

@@ -3,7 +3,6 @@
 """The main function of every node: environment, start, clean end, one-line errors."""
 
 from collections.abc import Callable
-import ctypes
 import faulthandler
 import gc
 import os
@@ -15,16 +14,13 @@ import time
 from types import FrameType
 from typing import Protocol
 
-PARENT_VARIABLE = 'CRGAME_PARENT_PID'
+from crgame_ros.processes import end_with_parent, name_process
+
 NICE_VARIABLE = 'CRGAME_NICE'
-PR_SET_PDEATHSIG = 1
-PR_SET_NAME = 15
 # At this signal a node prints the stacks of its threads.
 TELL_WHERE = signal.SIGUSR1
-
-
 # A node that has lost its parent has this long to end in good order; period of that check [s].
-_ALONE, _GRACE_S, _LOOK_S = 'alone', 40.0, 2.0
+_GRACE_S, _LOOK_S = 40.0, 2.0
 
 
 class StopFlag:
@@ -52,33 +48,15 @@ class RunnableNode(Protocol):
         """Release the node's endpoints."""
 
 
-def end_with_parent() -> int | None:
-    """
-    Ask the kernel to end this process in good order when the one that started it dies.
-
-    This applies only if the parent requested it (`CRGAME_PARENT_PID`): what is started by hand
-    goes on.
-
-    :return: the parent's process id if so.
-    """
-    parent = os.environ.get(PARENT_VARIABLE)
-    if parent is None:
-        return None
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-    if os.getppid() != int(parent):
-        sys.exit(f'the process {parent} that started this one is gone')
-    return int(parent)
-
-
 def die_with_parent() -> None:
     """
-    End with the parent, as `end_with_parent`, and at once if a good end takes too long.
+    End with a parent that asked for it, and at once if a good end takes too long.
 
     If something hangs, no parent is left to end this process.
     """
     parent = end_with_parent()
-    if parent is not None and not any(thread.name == _ALONE for thread in threading.enumerate()):
-        threading.Thread(target=_end_alone, args=(parent,), name=_ALONE, daemon=True).start()
+    if parent is not None:
+        threading.Thread(target=_end_alone, args=(parent,), name='alone', daemon=True).start()
 
 
 def _end_alone(parent: int) -> None:
@@ -87,11 +65,6 @@ def _end_alone(parent: int) -> None:
         time.sleep(_LOOK_S)
     time.sleep(_GRACE_S)
     os._exit(1)
-
-
-def name_process(name: str) -> None:
-    """Name this process for `top` and `ps -o comm`, which show the first 15 characters."""
-    ctypes.CDLL(None).prctl(PR_SET_NAME, name.encode())
 
 
 def _check_parameters(node: RunnableNode) -> None:

@@ -2,18 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """The cases of a test: a run of a game with a seed each, on all cores."""
 
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import as_completed, ProcessPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from importlib import import_module
 import multiprocessing
+import os
 from pathlib import Path
 import shlex
-import time
+import signal
+import threading
 
-from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.errors import InputError
 from crgame_ros.game.expectation import Expectation
-from crgame_ros.game.game import Game, load_game
+
+# The module that runs a case, which the process that only hands cases out does not need.
+RUNNER = 'crgame_ros.verdict.case_run'
 
 
 def replay_command(folder: Path) -> str:
@@ -109,52 +115,6 @@ def _has_expectations(file: Path) -> bool:
         return False
 
 
-def run_case(case: Case, out: Path) -> CaseResult:
-    """
-    Run a case, and judge it.
-
-    :param out: folder for the reports and recordings of runs that break an expectation.
-    """
-    # Imported here: the process that only hands cases out does not need them.
-    from crgame_ros.analysis.report.run_files import write_run_files
-    from crgame_ros.analysis.runs.run import Run
-    from crgame_ros.evaluation.judging import check_expectations, shortfalls
-    from crgame_ros.evaluation.results.cell_rows import vehicle_rows
-    from crgame_ros.simulation.contacts import contacts_of
-    from crgame_ros.simulation.offline import run_offline
-    from crgame_ros.simulation.setup import build_setup
-    began = time.perf_counter()
-    expectations: tuple[Expectation, ...] = ()
-    try:
-        game = load_game(case.file)
-        expectations = game.expect
-        check_expectations(game, str(case.file))
-        game = _adapted(game, case)
-        result = run_offline(build_setup(game), keep_messages=True)
-        run = Run(case.name, result=result, scoring='drives')
-        rows = vehicle_rows(run, result, contacts_of(result))
-        broken = tuple(tuple(shortfalls(each, rows)) for each in expectations)
-        folder = None
-        if any(broken):
-            folder = out / '-'.join((
-                case.game.stem, str(case.seed), *(case.copy[:1] if case.copy else ())))
-            folder.mkdir(parents=True, exist_ok=True)
-            write_run_files(run, result, game, folder)
-    except CrgameError as error:
-        return CaseResult(case, expectations, (), str(error), time.perf_counter() - began)
-    return CaseResult(case, expectations, broken, '', time.perf_counter() - began, folder)
-
-
-def _adapted(game: Game, case: Case) -> Game:
-    """Return the game with the seed and the planner of a case."""
-    if case.planner is not None:
-        from crgame_ros.scenario.loading import load_scenario
-        from crgame_ros.simulation.av_assignment import adapt_game
-        game = adapt_game(game, load_scenario(game.scenario), seed=case.seed,
-                          planner=case.planner, options=dict(case.options))
-    return replace(game, seed=case.seed)
-
-
 def run_cases(cases: Sequence[Case], out: Path, workers: int,
               told: Callable[[CaseResult], object]) -> list[CaseResult]:
     """
@@ -164,36 +124,76 @@ def run_cases(cases: Sequence[Case], out: Path, workers: int,
     :return: in the order of the cases.
     """
     found: dict[int, CaseResult] = {}
-    broken: dict[int, CaseResult] = {}
-    for number, result, died in _results(dict(enumerate(cases)), out, workers):
-        if died:
-            broken[number] = result
-        else:
-            found[number] = result
-            told(result)
-    # A process that dies takes those of all other cases along.
-    for number in sorted(broken):
-        for _, result, _ in _results({number: cases[number]}, out, 1):
-            found[number] = result
-            told(result)
+    while len(found) < len(cases):
+        left = {number: case for number, case in enumerate(cases) if number not in found}
+        suspects = []
+        for number, result in _results(left, out, workers):
+            if result is None:
+                suspects.append(number)
+            else:
+                found[number] = result
+                told(result)
+        # Of cases that ran at the same time, one ended its process, and the pool: which one?
+        for number in suspects:
+            for _, result in _results({number: cases[number]}, out, 1):
+                found[number] = result or CaseResult(
+                    cases[number], (), (), 'the process that ran it has died', 0.0)
+                told(found[number])
     return [found[number] for number in range(len(cases))]
 
 
 def _results(cases: Mapping[int, Case], out: Path,
-             workers: int) -> Iterator[tuple[int, CaseResult, bool]]:
-    """Yield the numbers and results of cases as they come, and whether a process had died."""
-    context = multiprocessing.get_context('spawn')
-    with ProcessPoolExecutor(min(workers, len(cases)), mp_context=context) as pool:
-        waiting = {pool.submit(run_case, case, out): number for number, case in cases.items()}
-        try:
-            for done in as_completed(waiting):
-                number = waiting[done]
+             workers: int) -> Iterator[tuple[int, CaseResult | None]]:
+    """
+    Yield the numbers and results of cases as they come, up to the end of the pool of processes.
+
+    A result is None if a process had died; of the cases that had not begun then there is none.
+    """
+    # Forks of one process that imports what all of them need, which takes seconds.
+    context = multiprocessing.get_context('forkserver')
+    context.set_forkserver_preload([RUNNER])
+    pool = ProcessPoolExecutor(min(workers, len(cases)), context, _begin, (os.getcwd(),))
+    running: dict[Future[CaseResult], int] = {}
+    waiting = deque(cases)
+    try:
+        while waiting or running:
+            # No more than can run, as those that are handed out are not taken back.
+            while waiting and len(running) < workers:
                 try:
-                    yield number, done.result(), False
-                except Exception as error:  # a process that died, or a planner's fault
-                    yield (number, CaseResult(cases[number], (), (),
-                                              f'{type(error).__name__}: {error}', 0.0),
-                           isinstance(error, BrokenProcessPool))
-        except (KeyboardInterrupt, GeneratorExit):
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+                    future = pool.submit(_run, cases[waiting[0]], out)
+                except BrokenProcessPool:
+                    waiting.clear()
+                else:
+                    running[future] = waiting.popleft()
+            for done in wait(running, return_when=FIRST_COMPLETED).done:
+                number = running.pop(done)
+                try:
+                    yield number, done.result()
+                except BrokenProcessPool:
+                    waiting.clear()
+                    yield number, None
+                except Exception as error:  # a planner's fault
+                    yield number, CaseResult(cases[number], (), (),
+                                             f'{type(error).__name__}: {error}', 0.0)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _begin(folder: str) -> None:
+    """Prepare a process: a fork begins where the first one did, and Ctrl-C is ignored in it."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    os.chdir(folder)
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that hands cases out has died, however it did."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _run(case: Case, out: Path) -> CaseResult:
+    result: CaseResult = import_module(RUNNER).run_case(case, out)
+    return result

@@ -3,7 +3,6 @@
 """The command `crgame import`: maps and data sets of other formats."""
 
 import argparse
-from functools import partial
 from pathlib import Path
 import sys
 from typing import TYPE_CHECKING
@@ -75,7 +74,8 @@ def run(values: argparse.Namespace) -> int:
     return 0
 
 
-_say = partial(print, file=sys.stderr, flush=True)
+def _say(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
 
 
 def _import_map(values: argparse.Namespace, kind: 'WorldKind') -> None:

@@ -11,6 +11,7 @@ import pytest
 
 SCRIPT = """
 import os, signal, time
+from crgame_ros.processes import PARENT_VARIABLE
 from crgame_ros.ros import node_main
 parent = os.getpid()
 if (child := os.fork()):
@@ -20,7 +21,7 @@ if (child := os.fork()):
 node_main._GRACE_S, node_main._LOOK_S = 0.5, 0.1
 # As one whose main thread waits for ever does.
 signal.signal(signal.SIGTERM, signal.SIG_IGN)
-os.environ[node_main.PARENT_VARIABLE] = str(parent)
+os.environ[PARENT_VARIABLE] = str(parent)
 node_main.die_with_parent()
 os.close(1)
 time.sleep(600.0)

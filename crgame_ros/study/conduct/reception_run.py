@@ -14,7 +14,7 @@ import sys
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.exposure import Exposure, tls_context
 from crgame_ros.cockpit.server import listen
-from crgame_ros.ros.node_main import PARENT_VARIABLE
+from crgame_ros.processes import PARENT_VARIABLE
 from crgame_ros.study.data.conducted_study import read_participant
 from crgame_ros.study.desk.reception import create_reception_app, Reception
 from crgame_ros.study.desk.server import PARTICIPANT

@@ -6,7 +6,6 @@ import argparse
 import asyncio
 from functools import partial
 import math
-import os
 from pathlib import Path
 import sys
 
@@ -199,10 +198,9 @@ def run_command(values: argparse.Namespace) -> int:
     require_ros()
     prepare_environment()
     from crgame_ros.launcher.interruption import print_now
-    from crgame_ros.ros.node_main import end_with_parent, PARENT_VARIABLE
-    # A session of a reception ends with it; the processes of the session have another parent.
+    from crgame_ros.processes import end_with_parent
+    # A session of a reception ends with it.
     end_with_parent()
-    os.environ.pop(PARENT_VARIABLE, None)
     from crgame_ros.study.conduct.session_run import conduct, SessionRequest
     study = load_study(values.file)
     participants = [check_participant(name) for name in values.participant.split(',')]

@@ -19,6 +19,7 @@ from crgame_ros.game.documents import EVENTS, GAME, GameDocument
 from crgame_ros.game.task_documents import TASK_LOG
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.nodes.cockpit.orders import CockpitOrders
+from crgame_ros.processes import PARENT_VARIABLE
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
 from crgame_ros.ros.environment import free_domain_id
 from crgame_ros.ros.messages import from_time
@@ -60,11 +61,11 @@ class StudyGraph:
         self._log.touch(mode=0o600)
         with self._log.open('wb') as log:
             self._process = subprocess.Popen(
-                [sys.executable, '-m', 'crgame_ros.study.conduct.watched_launcher',
-                 str(os.getpid()), str(game), '--out', str(folder), '--port', str(port),
-                 '--no-report', '--start-paused', *more],
+                [sys.executable, '-m', 'crgame_ros.launcher.main', str(game), '--out',
+                 str(folder), '--port', str(port), '--no-report', '--start-paused', *more],
                 stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
-                env={**os.environ, 'ROS_DOMAIN_ID': str(self.domain_id)},
+                env={**os.environ, 'ROS_DOMAIN_ID': str(self.domain_id),
+                     PARENT_VARIABLE: str(os.getpid())},
                 # Ctrl-C goes to the study only, which ends its drive, then the graph.
                 start_new_session=True)
 
