@@ -38,23 +38,24 @@ instruments:
 """
 RATE_HZ = 50.0
 # Pictures of a phase, and known samples that it needs at least.
-PICTURES, ENOUGH = 12, 10
+PICTURES, ENOUGH = 6, 10
 # Where a person would look on the screen: at the middle of a vehicle, projected by three.js, or at
-# that of a mirror, by its place in docs/driver_view.md's picture.
+# that of a mirror, by its place in docs/driver_view.md's picture; after the number of pictures.
 AIM = """
 const [target] = arguments;
 const { picture } = crgame.view3d;
 const stage = document.querySelector('#stage').getBoundingClientRect();
 const onScreen = (x, y) => [(window.corner[0] + stage.left + x * stage.width) / screen.width,
   (window.corner[1] + stage.top + y * stage.height) / screen.height];
+const { frames } = crgame.view3d.stats;
 if (target === 'mirror') {
-  return onScreen(0.105, 1 - 0.47);
+  return [frames, onScreen(0.105, 1 - 0.47)];
 }
 const index = crgame.store.scene.objects.findIndex(({ id }) => id === 'lead');
 const [x, y] = crgame.store.displayed(performance.now()).objects.subarray(6 * index);
 const point = picture.camera.position.clone().set(
   x - picture.origin.x, y - picture.origin.y, 0.7).project(picture.camera);
-return onScreen(0.5 * (1 + point.x), 0.5 * (1 - point.y));
+return [frames, onScreen(0.5 * (1 + point.x), 0.5 * (1 - point.y))];
 """
 # Where the page is on the screen, as the browser tells it with a mouse.
 CORNER = """
@@ -116,14 +117,15 @@ def look(page: LivePage, eyes: Eyes, target: str) -> tuple[float, float]:
     """Look somewhere until the page has shown some pictures; return from when until when."""
     fixed = {'beside': (1.4, 0.5), 'nowhere': (math.nan, math.nan)}
 
-    def aim() -> None:
-        eyes.aim = fixed.get(target) or tuple(page.run(AIM, target))
+    def aim() -> int:
+        frames, place = page.run(AIM, target)
+        eyes.aim = fixed.get(target) or tuple(place)
+        return int(frames)
 
-    aim()
+    last = aim() + PICTURES
     begin_s = pylsl.local_clock()
-    frames = page.run('return crgame.view3d.stats.frames')
-    while page.run('return crgame.view3d.stats.frames') < frames + PICTURES:
-        aim()
+    while aim() < last:
+        pass
     return begin_s, pylsl.local_clock()
 
 
@@ -154,7 +156,7 @@ def test_gaze_on_the_screen_is_on_what_was_there(
     page.run_async(STRANGER)
     phases = {target: look(page, eyes, target)
               for target in ('vehicle', 'mirror', 'beside', 'nowhere')}
-    page.order('stop')
+    assert graph.peer.call('/sim/stop').success
     bag = bag_of(graph)
     tables = {name: table.to_pandas() for name, table in tables_of(
         [Run.of_recording(bag)]).items()}
