@@ -159,18 +159,21 @@ def _transition(now: TraceState, then: TraceState, dynamics: 'VehicleDynamics', 
 def _apparently_made(start: FloatArray, end: FloatArray, dynamics: 'VehicleDynamics',
                      step_s: float) -> FloatArray | None:
     """
-    Return the KS model's next state with the inputs that speeds and steering angles imply.
+    Return the next state of model KS or PM with the inputs that imply those states themselves.
+
+    These are the steering rate and acceleration, or the accelerations along both axes.
 
     :return: the state; None if it is not near the target, and better inputs have to be searched.
     """
-    if dynamics.vehicle_model is not VehicleModel.KS:
+    if dynamics.vehicle_model not in (VehicleModel.KS, VehicleModel.PM):
         return None
     made = dynamics.forward_simulation(start, (end[2:4] - start[2:4]) / step_s, step_s,
                                        throw=False)
     if made is None:
         return None
-    errors = made[[0, 1, 3, 4]] - end[[0, 1, 3, 4]]
-    errors[3] = math.remainder(float(errors[3]), 2.0 * math.pi)
+    errors = made - end
+    if dynamics.vehicle_model is VehicleModel.KS:
+        errors[4] = math.remainder(float(errors[4]), 2.0 * math.pi)
     return np.asarray(made) if np.linalg.norm(errors) < _NEAR else None
 
 

@@ -129,16 +129,26 @@ def test_point_masses_and_inputs(problem: PlanningProblem) -> None:
     assert len(simulated(_solution(inputs), problem, DT_S).state_list) == 4
 
 
+@pytest.mark.parametrize('model', [VehicleModel.KS, VehicleModel.PM])
 @pytest.mark.parametrize('aside', [0.0, 0.012, 0.019, 0.021, 0.04])
 @pytest.mark.parametrize('along', [0.0, -0.015, 0.025, 0.2])
-def test_the_verdict_is_that_of_the_search(problem: PlanningProblem, aside: float,
-                                           along: float) -> None:
+def test_the_verdict_is_that_of_the_search(problem: PlanningProblem, aside: float, along: float,
+                                           model: VehicleModel) -> None:
     """Around the tolerances, where inputs are tried before the checker searches for better."""
     now, then = _driven(problem)[:2]
     heading = np.array([np.cos(then.orientation), np.sin(then.orientation)])
+    if model is VehicleModel.PM:
+        # 2 m/s^2 along, 3 m/s^2 across.
+        velocity = np.array([10.0, 0.0])
+        faster = velocity + DT_S * np.array([2.0, 3.0])
+        middle = 0.5 * DT_S * (velocity + faster)
+        now = PMState(0, np.zeros(2), *velocity)
+        then = PMState(1, middle, *faster)
+        heading = velocity / 10.0
     then.position = then.position + along * heading + aside * np.array([-heading[1], heading[0]])
-    expected, _ = state_transition_feasibility(now, then, VehicleDynamics.KS(KIND), DT_S)
-    assert check_feasibility(_solution([now, then]), problem, DT_S).feasible is expected
+    dynamics = VehicleDynamics.from_model(model, KIND)
+    expected, _ = state_transition_feasibility(now, then, dynamics, DT_S)
+    assert check_feasibility(_solution([now, then], model), problem, DT_S).feasible is expected
 
 
 def test_a_single_state_has_no_transition(problem: PlanningProblem) -> None:
