@@ -1,13 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Write docs/interfaces.md, the tables of the contract, from msg_defs/interfaces.yaml."""
+"""
+Write docs/interfaces.md, the tables of the contract, from msg_defs/interfaces.yaml.
 
-import argparse
+    python3 scripts/make_interface_docs.py            write the page
+    python3 scripts/make_interface_docs.py --check    say whether it is up to date, change nothing
+"""
+
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 import re
+import sys
 
 from crgame_ros.messages.contract import Contract, load_contract, Qos, Service, Topic
+from written import main_of
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / 'msg_defs' / 'interfaces.yaml'
@@ -94,12 +100,5 @@ def _escaped(text: str) -> str:
     return text.replace('<', '&lt;').replace('|', '\\|')
 
 
-def main() -> None:
-    """Write the page and name it."""
-    argparse.ArgumentParser(description=__doc__).parse_args()
-    TARGET.write_text(document(), encoding='utf-8')
-    print(TARGET)
-
-
 if __name__ == '__main__':
-    main()
+    sys.exit(main_of(__doc__, lambda: {TARGET: document()}))

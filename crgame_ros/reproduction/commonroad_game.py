@@ -18,6 +18,7 @@ from crgame_ros.analysis.pictures.profiles_figure import profiles_figure
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.analysis.pictures.timing_figure import timing_figure
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS
+from crgame_ros.cockpit.finite_json import finite
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.export import write_scenario
 from crgame_ros.recording.run_record import RunRecord
@@ -257,7 +258,7 @@ def write_report(request: EvaluationRequest, single: EvaluationPart, multi: Eval
         'single_av': single.numbers, 'multi_av': multi.numbers,
         **({} if timing is None else timing.numbers)}
     report, data = request.folder / NAME, request.folder / NUMBERS
-    write_text(json.dumps(numbers, indent=2) + '\n', data)
+    write_text(json.dumps(finite(numbers), indent=2) + '\n', data)
     files = [file for part in parts for file in part.files]
     write_text('\n'.join(_lines(request, judgements, numbers, files)) + '\n', report)
     return report, data

@@ -37,6 +37,25 @@ def _chromium() -> str | None:
     return next(filter(None, map(shutil.which, _BROWSERS)), None)
 
 
+# Where to click an element, or why that is impossible; whether it has been clicked is noted.
+_CLICK_PLACE = """
+const [selector] = arguments;
+const element = document.querySelector(selector);
+if (!element) { return 'is not there'; }
+if (element.matches(':disabled')) { return 'is disabled'; }
+element.scrollIntoView({block: 'nearest', inline: 'nearest'});
+const box = element.getBoundingClientRect();
+const place = [box.x + box.width / 2, box.y + box.height / 2];
+const hit = document.elementFromPoint(...place);
+if (!element.contains(hit)) { return `is behind ${hit?.outerHTML.slice(0, 100)}`; }
+window.hasBeenClicked = false;
+document.addEventListener('click', ({target}) => {
+  window.hasBeenClicked = target.closest(selector) !== null;
+}, {capture: true, once: true});
+return place;
+"""
+
+
 class Browser:
     """
     One browser window.
@@ -114,6 +133,29 @@ class Browser:
             if time.monotonic() > end:
                 pytest.fail(f'waited {patience_s:.0f} s in vain for {what or condition}'
                             f'{error and f" ({error})" or ""}; console: {self.console_errors()}')
+            time.sleep(_POLL_S)
+
+    def click(self, selector: str, patience_s: float = PATIENCE_S) -> None:
+        """
+        Click an element with the mouse, once it exists, is enabled and nothing is before it.
+
+        By the mouse's own events: Selenium's click takes a second on a page that draws. If the
+        page moves the element meanwhile, the click is repeated.
+        """
+        end = time.monotonic() + patience_s
+        while True:
+            place = self.run(_CLICK_PLACE, selector)
+            if not isinstance(place, str):
+                for kind in ('mouseMoved', 'mousePressed', 'mouseReleased'):
+                    self.driver.execute_cdp_cmd('Input.dispatchMouseEvent', {
+                        'type': kind, 'x': place[0], 'y': place[1], 'clickCount': 1,
+                        'button': 'none' if kind == 'mouseMoved' else 'left'})
+                # Nothing is known of it if the click has opened another page.
+                if self.run('return window.hasBeenClicked') is not False:
+                    return
+                place = 'moves away'
+            if time.monotonic() > end:
+                pytest.fail(f'{selector} cannot be clicked: it {place}')
             time.sleep(_POLL_S)
 
     def wait_for_frame(self) -> None:

@@ -8,17 +8,13 @@ from io import BytesIO
 from pathlib import Path
 import signal
 import sys
-import time
 from typing import Any, NamedTuple
 
 from browser_support import Browser
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-import pytest
-from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.action_chains import ActionChains
-from selenium.webdriver.common.by import By
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'live'))
 
@@ -136,20 +132,7 @@ class LivePage:
 
     def click(self, selector: str) -> None:
         """Click an element with the mouse once it exists and is clickable."""
-        end = time.monotonic() + PATIENCE_S
-        while True:
-            try:
-                element = self.driver.find_element(By.CSS_SELECTOR, selector)
-                if element.is_enabled():
-                    element.click()
-                    return
-                problem = 'disabled'
-            except WebDriverException as error:
-                # Changes rebuild the lists, so the element is looked up again.
-                problem = str(error).splitlines()[0]
-            if time.monotonic() > end:
-                pytest.fail(f'{selector} cannot be clicked: {problem}')
-            time.sleep(_POLL_S)
+        self.browser.click(selector, PATIENCE_S)
 
     def tab(self, name: str) -> None:
         """Open a panel by its tab."""

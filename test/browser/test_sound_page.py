@@ -75,14 +75,10 @@ def page(run: RecordedRun, browser: Browser) -> Iterator[Served]:
     assert browser.console_errors() == []
 
 
-def click(browser: Browser, selector: str) -> None:
-    browser.driver.find_element(By.CSS_SELECTOR, selector).click()
-
-
 def turn_on(browser: Browser) -> None:
     """Turn the sound on as a person does, by a click."""
-    click(browser, '#sound')
-    click(browser, '#sound-panel .drive-button')
+    browser.click('#sound')
+    browser.click('#sound-panel .drive-button')
     browser.wait('crgame.sound.on', 'sound')
 
 
@@ -100,7 +96,7 @@ def take_seat(page: Served, browser: Browser) -> None:
         'requests': [], 'others': [], 'lost': False}}})
     browser.wait("crgame.driving.seat === 'hv0'", 'the seat')
     browser.run('window.focus();')
-    click(browser, '#world')
+    browser.click('#world')
     browser.wait('crgame.driving.away === null', 'hands on the controls')
 
 
@@ -170,7 +166,7 @@ def test_a_game_may_have_none(page: Served, browser: Browser, run: RecordedRun) 
     take_seat(page, browser)
     browser.run('moveStick(0.6)')
     browser.driver.find_element(By.TAG_NAME, 'body').send_keys('m')
-    click(browser, '#sound')
+    browser.click('#sound')
     assert not browser.driver.find_element(
         By.CSS_SELECTOR, '#sound-panel .drive-button').is_enabled()
     off_road(page, browser)

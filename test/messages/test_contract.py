@@ -4,7 +4,7 @@
 
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
-import importlib.util
+import importlib
 from pathlib import Path
 import re
 from types import ModuleType
@@ -32,14 +32,11 @@ NAME = re.compile(r'(/(<hv>|<av>|<v>|[a-z][a-z0-9_]*))+')
 PARAMETER_TYPES = {'string', 'double', 'bool', 'integer'}
 
 
-def _page_maker(root: Path) -> ModuleType:
-    """Import the script that makes the page."""
-    spec = importlib.util.spec_from_file_location(
-        'make_interface_docs', root / 'scripts' / 'make_interface_docs.py')
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+@pytest.fixture
+def page_maker(project_root: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Return the script that makes the page."""
+    monkeypatch.syspath_prepend(project_root / 'scripts')
+    return importlib.import_module('make_interface_docs')
 
 
 def _by_name(topic: Topic) -> str:
@@ -196,15 +193,15 @@ def test_incomplete_row_is_refused(change: dict[str, Any], tmp_path: Path) -> No
         load_contract(path)
 
 
-def test_page_is_up_to_date(project_root: Path) -> None:
+def test_page_is_up_to_date(project_root: Path, page_maker: ModuleType) -> None:
     """`docs/interfaces.md` is what `scripts/make_interface_docs.py` makes of the contract."""
     page = (project_root / 'docs' / 'interfaces.md').read_text(encoding='utf-8')
-    assert page == _page_maker(project_root).document(), 'run scripts/make_interface_docs.py'
+    assert page == page_maker.document(), 'run scripts/make_interface_docs.py'
 
 
-def test_page_has_every_row(project_root: Path) -> None:
+def test_page_has_every_row(page_maker: ModuleType) -> None:
     """Each topic, field, service and parameter has a line in a table."""
-    lines = _page_maker(project_root).document().splitlines()
+    lines = page_maker.document().splitlines()
     for topic in TOPICS:
         row, = (line for line in lines if line.startswith(f'| `{topic.name}` |'))
         for text in (topic.type_name, topic.qos.reliability, f'depth {topic.qos.depth}',
@@ -217,14 +214,14 @@ def test_page_has_every_row(project_root: Path) -> None:
         assert sum(f'| `{name}` |' in line for line in lines) == 1
 
 
-def test_page_follows_the_file(project_root: Path, tmp_path: Path) -> None:
+def test_page_follows_the_file(project_root: Path, tmp_path: Path,
+                               page_maker: ModuleType) -> None:
     """A changed depth appears in the page made from the changed file, and only there."""
     source = project_root / 'msg_defs' / 'interfaces.yaml'
     path = tmp_path / 'interfaces.yaml'
     text = source.read_text(encoding='utf-8')
     path.write_text(text.replace('clock: {depth: 10,', 'clock: {depth: 11,'), encoding='utf-8')
-    maker = _page_maker(project_root)
-    before, after = (maker.document(item).splitlines() for item in (source, path))
+    before, after = (page_maker.document(item).splitlines() for item in (source, path))
     changed = [pair for pair in zip(before, after, strict=True) if pair[0] != pair[1]]
     assert len(changed) == 1
     assert changed[0][1] == changed[0][0].replace('depth 10', 'depth 11')
