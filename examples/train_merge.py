@@ -120,8 +120,10 @@ def look(seen: Observed) -> Around:
 def features(seen: Observed) -> tuple[float, Array]:
     """Return the room to change into, and what it depends on to drive faster or slower (3)."""
     around, speed = look(seen), float(seen['state'][0])
+    # Whoever will be before it on the motorway counts on the ramp already.
+    before = min(around.before, around.left_before) if on_ramp(seen) else around.before
     pace = np.array(((MOTORWAY - speed) / DIFFERENT, around.left_faster / DIFFERENT,
-                     2.0 * (around.before - 1.0)))
+                     2.0 * (before - 1.0)))
     return min(around.left_before, around.left_behind), np.clip(pace, -3.0, 3.0)
 
 
