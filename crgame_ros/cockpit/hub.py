@@ -14,9 +14,9 @@ from crgame_ros.analysis.criticality.criticality import EXPOSURES
 from crgame_ros.analysis.criticality.rows import MEASURED
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.cockpit.client import Client
-from crgame_ros.cockpit.finite_json import finite
 from crgame_ros.cockpit.rights import ALL_RIGHTS, Rights
 from crgame_ros.cockpit.shown_paths import without_paths
+from crgame_ros.finite_json import finite
 from crgame_ros.version import __version__
 
 MAX_CLIENTS = 32

@@ -8,12 +8,12 @@ from dataclasses import replace
 import json
 from pathlib import Path
 
-from crgame_ros.cockpit.finite_json import finite
 from crgame_ros.cockpit.job_process import serve_jobs
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
+from crgame_ros.finite_json import finite
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, load_game
 from crgame_ros.planner.registry import PLANNERS
 from crgame_ros.scenario import guard

@@ -12,7 +12,7 @@ from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking
 from commonroad.scenario.traffic_light import TrafficLight
 from commonroad.scenario.traffic_sign import TrafficSign
-from crgame_ros.cockpit.finite_json import finite
+from crgame_ros.finite_json import finite
 from crgame_ros.game.documents import document_entry, DrivenVehicle, GameDocument
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import PerceptionSpec

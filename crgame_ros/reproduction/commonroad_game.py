@@ -18,7 +18,7 @@ from crgame_ros.analysis.pictures.profiles_figure import profiles_figure
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.analysis.pictures.timing_figure import timing_figure
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS
-from crgame_ros.cockpit.finite_json import finite
+from crgame_ros.finite_json import finite
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.export import write_scenario
 from crgame_ros.recording.run_record import RunRecord
