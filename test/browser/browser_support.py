@@ -135,14 +135,14 @@ class Browser:
                             f'{error and f" ({error})" or ""}; console: {self.console_errors()}')
             time.sleep(_POLL_S)
 
-    def click(self, selector: str, patience_s: float = PATIENCE_S) -> None:
+    def click(self, selector: str) -> None:
         """
         Click an element with the mouse, once it exists, is enabled and nothing is before it.
 
         By the mouse's own events: Selenium's click takes a second on a page that draws. If the
         page moves the element meanwhile, the click is repeated.
         """
-        end = time.monotonic() + patience_s
+        end = time.monotonic() + PATIENCE_S
         while True:
             place = self.run(_CLICK_PLACE, selector)
             if not isinstance(place, str):

@@ -25,7 +25,6 @@ __all__ = ['Graph', 'live_graph', 'LivePage', 'PATIENCE_S', 'SCENARIOS']
 
 # Timeout of events that must come [s]: many times the duration on an idle machine.
 PATIENCE_S = 45.0
-_POLL_S = 0.05
 THROTTLE, BRAKE, STEERING = 0, 1, 2
 # How long the page shows notices and mishaps [ms]; a slow test would look too late.
 MESSAGES_STAY_MS = (5000, 9000, 10000)
@@ -132,7 +131,7 @@ class LivePage:
 
     def click(self, selector: str) -> None:
         """Click an element with the mouse once it exists and is clickable."""
-        self.browser.click(selector, PATIENCE_S)
+        self.browser.click(selector)
 
     def tab(self, name: str) -> None:
         """Open a panel by its tab."""

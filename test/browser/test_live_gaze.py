@@ -38,7 +38,7 @@ instruments:
 """
 RATE_HZ = 50.0
 # Pictures of a phase, and known samples that it needs at least.
-PICTURES, ENOUGH = 6, 10
+PICTURES, ENOUGH = 12, 10
 # Where a person would look on the screen: at the middle of a vehicle, projected by three.js, or at
 # that of a mirror, by its place in docs/driver_view.md's picture; after the number of pictures.
 AIM = """
@@ -156,7 +156,7 @@ def test_gaze_on_the_screen_is_on_what_was_there(
     page.run_async(STRANGER)
     phases = {target: look(page, eyes, target)
               for target in ('vehicle', 'mirror', 'beside', 'nowhere')}
-    assert graph.peer.call('/sim/stop').success
+    page.order('stop')
     bag = bag_of(graph)
     tables = {name: table.to_pandas() for name, table in tables_of(
         [Run.of_recording(bag)]).items()}

@@ -41,10 +41,10 @@ def lanes(network: RoadNetwork) -> Iterator[int]:
     return (lanelet for lanelet in network.lanelet_ids if network.is_drivable(lanelet))
 
 
-def test_an_opendrive_map_keeps_its_metres(tmp_path: Path) -> None:
+def test_an_opendrive_map_is_driven_on_in_metres(tmp_path: Path) -> None:
     source = tmp_path / 'bend.xodr'
     source.write_text(opendrive())
-    loaded, network, _, told = imported(source, '--no-drive')
+    loaded, network, out, told = imported(source)
     # Lane centres are 1.75 m beside the reference line: inside and outside of the bend.
     lengths = sorted(network.line(lanelet).length for lanelet in lanes(network))
     assert lengths == pytest.approx([100.0 + 98.25, 100.0 + 101.75], abs=0.02)
@@ -58,6 +58,7 @@ def test_an_opendrive_map_keeps_its_metres(tmp_path: Path) -> None:
     crosswalks = [lanelet for lanelet in network.lanelet_ids if not network.is_drivable(lanelet)]
     middle = network.line(crosswalks[0]).points.mean(axis=0)
     assert len(crosswalks) == 1 and middle == pytest.approx([50.0, 0.0], abs=0.01)
+    assert 'touched nothing and stayed on the road; none of ' in out
     assert len(loaded.planning_problems) == 1
 
 
