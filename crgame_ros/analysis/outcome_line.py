@@ -3,6 +3,7 @@
 """A run in one line, and the AVs whose planners never drove; alike live, offline and replayed."""
 
 from collections.abc import Callable, Sequence
+import math
 
 from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
 from crgame_ros.analysis.scores.vehicle import VehicleScores
@@ -39,9 +40,11 @@ def outcome_line(outcome: RunReport, criticality: Criticality | None = None,
     contacts = outcome['contacts']
     parts = [] if contacts is None else [_counted(len(contacts), 'contact')]
     found = () if criticality is None else criticality.report()
-    worst = [each.worst['ttc'].value for each in found if 'ttc' in each.worst]
-    if worst:
-        parts.append(f'{MEASURES["ttc"].extreme} {min(worst):.2f} s')
+    ttc = MEASURES['ttc']
+    least = min((each.worst['ttc'].value for each in found if 'ttc' in each.worst),
+                default=math.inf)
+    if ttc.matters(least):
+        parts.append(f'{ttc.extreme} {least:.2f} s')
     plans = plans_of_report(outcome).values()
     due = sum(found.due for found in plans)
     if due:

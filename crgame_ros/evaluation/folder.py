@@ -145,7 +145,6 @@ class EvaluationFolder:
 
 
 def _resource(table: TableDeclaration) -> dict[str, object]:
-    schema = table_schema(table)
-    schema.pop('foreignKeys', None)
     return {'name': table.name, 'type': 'table', 'path': f'{table.name}/*.parquet',
-            'format': 'parquet', 'description': f'One row is {table.row}.', 'schema': schema}
+            'format': 'parquet', 'description': f'One row is {table.row}.',
+            'schema': table_schema(table, None)}

@@ -184,6 +184,7 @@ class TriggerSender:
         if self._line is None or time.monotonic() - wanted_s > STALE_S:
             self.lost += 1
             return
+        before = self.count
         try:
             self._line.write(code)
             self._sent.put(SentTrigger(marker, code, time.monotonic()))
@@ -192,7 +193,8 @@ class TriggerSender:
                 time.sleep(self._spec.width)
                 self._line.write(0)
         except OSError as error:
-            self.lost += 1
+            # Where only the end of a pulse fails, its code has been sent.
+            self.lost += self.count == before
             self._line.close()
             self._line = None
             self._fail('has failed', error)

@@ -297,7 +297,8 @@ def _balance(study: StudyFile) -> Iterator[StudyFinding]:
             study.block_order != 'given' or study.block_sequences) else ():
         yield from _unbalanced(_Ordered(
             f'blocks in {group}' if group else 'blocks', 'block', len(study.blocks), 'block_order',
-            '' if study.block_sequences else study.block_order, block_rows(study)),
+            '' if study.block_sequences else study.block_order, block_rows(study),
+            len(study.blocks)),
             [[block.name for block in blocks_of(study, place, group)]
              for place in range(places)])
     for block, group in product(study.blocks, groups):
@@ -314,7 +315,8 @@ def _balance(study: StudyFile) -> Iterator[StudyFinding]:
             yield from _unbalanced(_Ordered(
                 f'{block.name} in {group}' if group else block.name, 'condition', conditions,
                 'order', '' if block.sequences else block.order,
-                block_rows(study) * rows_of(block.order, conditions)), orders)
+                block_rows(study) * rows_of(block.order, conditions),
+                len(block.sequences[0]) if block.sequences else conditions), orders)
 
 
 @dataclass(frozen=True)
@@ -328,6 +330,7 @@ class _Ordered:
     :param key: of the order in the file.
     :param kind: of the order; empty for sequences of the file.
     :param rows: multiples of so many participants are balanced.
+    :param length: of each repetition.
     """
 
     name: str
@@ -336,6 +339,7 @@ class _Ordered:
     key: str
     kind: str
     rows: int
+    length: int
 
 
 def _unbalanced(what: _Ordered, orders: list[list[str]]) -> Iterator[StudyFinding]:
@@ -345,13 +349,13 @@ def _unbalanced(what: _Ordered, orders: list[list[str]]) -> Iterator[StudyFindin
             else f'take "{what.key}: williams"'
         yield StudyFinding('warning', f'{what.name}: with {len(orders)} participants not '
                                       f'every {what.noun} is first equally often; {mend}')
-    follows = Counter(pair for order in orders for pair in _within(order, what.count))
+    follows = Counter(pair for order in orders for pair in _within(order, what.length))
     if len(follows) < what.count * (what.count - 1) or len(set(follows.values())) > 1:
         yield StudyFinding('warning', f'{what.name}: not every {what.noun} follows every other '
                                       'equally often')
 
 
-def _within(order: list[str], conditions: int) -> Iterable[tuple[str, str]]:
-    """Yield the pairs of successive conditions within each repetition."""
-    for start in range(0, len(order), conditions):
-        yield from pairwise(order[start:start + conditions])
+def _within(order: list[str], length: int) -> Iterable[tuple[str, str]]:
+    """Yield the pairs of successive conditions that differ, within each repetition."""
+    for start in range(0, len(order), length):
+        yield from (pair for pair in pairwise(order[start:start + length]) if len(set(pair)) > 1)

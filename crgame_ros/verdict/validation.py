@@ -64,8 +64,7 @@ def _parts(path: Path) -> Iterator[Path]:
         for session in sorted((person / 'runs').glob('*/')):
             for run in run_folders(session):
                 yield from bags_of(run)
-                yield from sorted(file for file in run.iterdir() if file.suffix in (
-                    '.xml', '.yaml') or file.name.startswith('timing') and file.suffix == '.json')
+                yield from _files_of_run(run)
     yield from sorted(file.parent for file in (path / 'data').rglob(PACKAGE_FILE)
                       if not (file.parent / 'evaluation.json').exists())
 
@@ -147,8 +146,13 @@ def parts_of(path: Path) -> list[Path]:
     if not path.is_dir() or recording_in(path) == path:
         return [path]
     tables = [path / TABLES] if (path / TABLES / PACKAGE_FILE).exists() else []
-    files = [file for file in path.iterdir() if file.suffix in ('.xml', '.yaml', '.json')]
-    return [recording_in(path), *tables, *sorted(files)]
+    return [recording_in(path), *tables, *_files_of_run(path)]
+
+
+def _files_of_run(folder: Path) -> list[Path]:
+    """Return a run's files that have a kind: scenarios, its game, timing reports."""
+    return sorted(file for file in folder.iterdir() if file.suffix in ('.xml', '.yaml')
+                  or file.match('timing*.json'))
 
 
 def _check_of(path: Path) -> Callable[[Path, Progress | None], FileVerdict]:

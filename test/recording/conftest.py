@@ -209,11 +209,11 @@ class RunRecorder:
         Write what two programs sent around a run, from a machine with another clock.
 
         A heart at 50 Hz from 0.2 s before the start on, without 0.5 to 0.8 s; its value is its
-        time on the run's clock. Two texts at 0.25 s and 0.75 s.
+        time on the run's clock. Texts at 0.25, 0.5 and 0.75 s, that between empty.
         """
         beats_s = np.arange(-10, 60) / 50.0
         beats_s = beats_s[(beats_s < 0.5) | (beats_s > 0.8)]
-        texts_s = np.array([0.25, 0.75])
+        texts_s = np.array([0.25, 0.5, 0.75])
         streams = InstrumentStreams((
             InstrumentStream(1, 'Heart', 'ECG', ('lead,1', 'lead 2'), ('mV', ''), 50.0, 'float32',
                              'amplifier', 'lab', True, 1),
@@ -228,7 +228,7 @@ class RunRecorder:
                                     np.full(len(at_s), 1e-4), STEADY_S + at_s + 0.01))
         heart = SampleBatch(1, times(beats_s), np.column_stack((beats_s, -beats_s)))
         notes = TextSamples(2, tuple(TextTimes(0, *row[1:]) for row in times(texts_s).tolist()),
-                            (('now',), ('=then\t"',)))
+                            (('now',), ('',), ('=then\t"',)))
         rows = np.array(heart.flat()).reshape(len(beats_s), -1)
         string = 'std_msgs/msg/String'
         # The list of streams may be recorded after the first samples.

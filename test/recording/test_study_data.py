@@ -225,7 +225,7 @@ def test_instruments_are_in_bids_as_it_has_them(studied: Studied) -> None:
         'utf-8').split('\n')[:-1], dialect='excel-tab'))
     notes = [row for row in events if row['trial_type'] == 'instrument' and row['trial'] == '2']
     assert [(row['name'], row['value']) for row in notes] == [
-        ('Notes', 'now'), ('Notes', escaped('=then\t"'))]
+        ('Notes', 'now'), ('Notes', 'n/a'), ('Notes', escaped('=then\t"'))]
     begun_s = float(notes[0]['onset']) - float(notes[0]['run_time'])
     assert told['StartTime'] == pytest.approx(begun_s - 0.2, abs=1e-4)
     assert [float(row['onset']) for row in events] == sorted(float(row['onset']) for row in events)

@@ -235,3 +235,14 @@ def test_a_sequence_is_taken_as_it_is(tmp_path: Path) -> None:
 def test_what_is_no_study_is_told(tmp_path: Path, changed: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         study_of(tmp_path, **changed)
+
+
+def test_sequences_are_balanced_by_their_own_length(tmp_path: Path) -> None:
+    """A sequence may name a condition several times: its pairs are those of the whole list."""
+    def text(*sequences: list[str]) -> str:
+        return told(study_of(tmp_path, blocks=[{'name': 'main', 'sequences': list(sequences)}]))
+
+    assert 'follows every other' not in text(['a', 'b', 'b', 'a'], ['b', 'a', 'a', 'b']) \
+        + text(['a', 'b', 'a'], ['b', 'a', 'b'])
+    assert 'main: not every condition follows every other equally often' in text(
+        ['a', 'b', 'b', 'a', 'a', 'b'], ['a', 'b', 'b', 'a', 'a', 'b'])

@@ -186,6 +186,8 @@ def _worst_of_all(run: Run, name: str) -> str:
         return NOTHING
     sign = MEASURES[name].worst
     worst = max(found, key=lambda each: sign * each.value)
+    if not MEASURES[name].matters(worst.value):
+        return NOTHING
     critical = run.usual_criticality.thresholds.exceeded(name, worst.value)
     return f'{marked(number(worst.value), critical)} <small>at {moment(run, worst.time_s)}</small>'
 

@@ -44,32 +44,50 @@ class WrittenTable(NamedTuple):
     rows: int
 
 
-def data_package(tables: Sequence[WrittenTable], file_format: Format, name: str) -> dict[str, Any]:
+class Parent(NamedTuple):
+    """A table with a row for each of something, and the field that names it in all tables."""
+
+    table: str
+    field: str
+
+
+RUNS = Parent('runs', 'run')
+
+
+def data_package(tables: Sequence[WrittenTable], file_format: Format, name: str,
+                 parent: Parent | None = RUNS) -> dict[str, Any]:
     """
     Return the data package of tables that have been written.
 
     :param name: name of the package.
+    :param parent: as for `table_schema`.
     """
     return {
         '$schema': PROFILE.format('datapackage'), 'name': name, 'title': f'Runs: {name}',
         'description': DESCRIPTION, 'createdBy': f'{CREATOR} {__version__}',
-        'resources': [_resource(table, file_format) for table in tables]}
+        'resources': [_resource(table, file_format, parent) for table in tables]}
 
 
-def table_schema(declaration: TableDeclaration) -> dict[str, object]:
-    """Return the Table Schema of a table."""
+def table_schema(declaration: TableDeclaration,
+                 parent: Parent | None = RUNS) -> dict[str, object]:
+    """
+    Return the Table Schema of a table.
+
+    :param parent: the table to whose rows the others belong; None for no such table.
+    """
     schema: dict[str, object] = {
         '$schema': PROFILE.format('tableschema'),
         'fields': [_field(column, column.name in declaration.key)
                    for column in declaration.columns],
         'missingValues': ['', NOT_A_NUMBER], 'primaryKey': list(declaration.key)}
-    if declaration.key != ('run',):
-        schema['foreignKeys'] = [{'fields': ['run'],
-                                  'reference': {'resource': 'runs', 'fields': ['run']}}]
+    if parent is not None and declaration.key != (parent.field,):
+        schema['foreignKeys'] = [{'fields': [parent.field], 'reference': {
+            'resource': parent.table, 'fields': [parent.field]}}]
     return schema
 
 
-def _resource(table: WrittenTable, file_format: Format) -> dict[str, object]:
+def _resource(table: WrittenTable, file_format: Format,
+              parent: Parent | None) -> dict[str, object]:
     with table.path.open('rb') as stream:
         digest = hashlib.file_digest(stream, 'sha256').hexdigest()
     resource: dict[str, object] = {
@@ -77,7 +95,7 @@ def _resource(table: WrittenTable, file_format: Format) -> dict[str, object]:
         'format': file_format, 'mediatype': _MEDIA_TYPES[file_format],
         'description': f'One row is {table.declaration.row}.', 'rows': table.rows,
         'hash': f'sha256:{digest}',
-        'schema': table_schema(table.declaration)}
+        'schema': table_schema(table.declaration, parent)}
     if file_format == 'csv':
         # Of Parquet, frictionless cannot count the bytes, and takes that for an error.
         resource['bytes'] = table.path.stat().st_size

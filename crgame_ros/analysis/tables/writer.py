@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self, TypeGuard
 
-from crgame_ros.analysis.tables.column import NUMBER, TableDeclaration, TEXT
+from crgame_ros.analysis.tables.column import FLAG, NUMBER, TableDeclaration, TEXT
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -147,7 +147,7 @@ class TableWriter(TableRows):
             self._parquet.write_table(piece.combine_chunks(), row_group_size=len(piece))
         elif self._csv is not None:
             for batch in piece.to_batches(max_chunksize=PIECE_ROWS // 8):
-                self._csv.writerows(zip(*map(_spelled, batch.columns), strict=True))
+                self._csv.writerows(zip(*map(spelled, batch.columns), strict=True))
 
     def close(self) -> None:
         """Write the remaining rows, and close the file."""
@@ -173,18 +173,22 @@ class TableWriter(TableRows):
             self.release()
 
 
-def _spelled(column: pa.Array) -> list[object]:
-    """Return a column's values as in CSV."""
-    values = column.to_pylist()
+def spelled(column: pa.Array | pa.ChunkedArray, is_guarded: bool = True) -> list[object]:
+    """
+    Return a column's values as in CSV.
+
+    :param is_guarded: whether text that looks like a formula gets a prefix.
+    """
+    values: list[object] = column.to_pylist()
     if column.type == NUMBER:
         # Full precision, always with a point or an exponent, so that none looks like an integer.
         return [NOT_A_NUMBER if value is None
                 else value if math.isfinite(value)
                 else INFINITE if value > 0.0 else f'-{INFINITE}' for value in values]
-    if column.type == TEXT:
+    if column.type == TEXT and is_guarded:
         return [FORMULA_GUARD + text if text and text.startswith(FORMULA_BEGINS) else text
                 for text in values]
-    if column.type == pa.bool_():
+    if column.type == FLAG:
         # Capitals, which R requires and other readers accept.
         return [None if flag is None else 'TRUE' if flag else 'FALSE' for flag in values]
     return values

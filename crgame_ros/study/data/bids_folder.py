@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 from crgame_ros.analysis.tables.column import Column, FLAG
 from crgame_ros.analysis.tables.instruments import INSTRUMENT_CHANNELS, INSTRUMENT_SAMPLES
 from crgame_ros.errors import InputError
+from crgame_ros.finite_json import finite
 from crgame_ros.recording.export import prepare_folder
 from crgame_ros.study.data.conducted_study import ParticipantRecord
 from crgame_ros.study.data.session_tables import drive_start_s, EVENTS_OF_SESSIONS
@@ -66,13 +67,13 @@ class InstrumentEvent(NamedTuple):
     :param wall_s: when [s since 1970]
     :param run_time_s: when, on the run's clock [s]
     :param stream: of which.
-    :param value: its text, or the values of its channels as JSON.
+    :param value: its text, or the values of its channels as JSON; None without a value.
     """
 
     wall_s: float
     run_time_s: float
     stream: str
-    value: str
+    value: str | None
 
 
 class _Stream(NamedTuple):
@@ -127,10 +128,12 @@ def _instrument_events(trial: CountedTrial) -> Iterator[InstrumentEvent]:
         if stream.rate_hz and not stream.texts:
             continue
         for place, time_s in enumerate(stream.times_s.tolist()):
-            found: list[str | None] | list[float] = \
+            sample: list[str | None] | list[float] = \
                 stream.texts[place] if stream.texts else stream.values[place].tolist()
-            value = str(found[0]) if len(found) == 1 else json.dumps(
-                dict(zip(stream.units, found, strict=True)), ensure_ascii=False)
+            first = None if sample[0] != sample[0] else sample[0]
+            value = json.dumps(finite(dict(zip(stream.units, sample, strict=True))),
+                               ensure_ascii=False) if len(sample) > 1 \
+                else None if first is None else str(first)
             yield InstrumentEvent(start_s + time_s, time_s, stream.id, value)
 
 

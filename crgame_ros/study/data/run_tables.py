@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import hashlib
 import json
 import math
-import os
 from pathlib import Path
 import shutil
 from typing import Any
@@ -18,6 +17,7 @@ from crgame_ros.analysis.tables.run_tables import tables_of
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.recording.run_folder import bags_of
+from crgame_ros.whole_file import whole_folder
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -85,22 +85,19 @@ class RunTablesCache:
         tabulated = Run.of_recording(run, progress=progress)
         tabulated.id = name
         tables = tables_of([tabulated])
-        part = folder.with_name(f'.{folder.name}.{os.getpid()}.part')
         try:
-            shutil.rmtree(part, ignore_errors=True)
-            part.mkdir(parents=True)
-            for table, rows in tables.items():
-                pq.write_table(rows, part / f'{table}.parquet', compression='zstd')
-            text = json.dumps(_summary(tabulated), indent=1, ensure_ascii=False)
-            (part / SUMMARY).write_text(text + '\n', encoding='utf-8')
-            (part / DIGESTS).write_text(_digests(part), encoding='utf-8')
-            shutil.rmtree(folder, ignore_errors=True)
-            part.rename(folder)
+            self._folder.mkdir(parents=True, exist_ok=True)
+            # A power cut may leave files without content: their hashes differ.
+            with whole_folder(folder) as part:
+                part.mkdir()
+                for table, rows in tables.items():
+                    pq.write_table(rows, part / f'{table}.parquet', compression='zstd')
+                text = json.dumps(_summary(tabulated), indent=1, ensure_ascii=False)
+                (part / SUMMARY).write_text(text + '\n', encoding='utf-8')
+                (part / DIGESTS).write_text(_digests(part), encoding='utf-8')
         except OSError as error:
             raise InputError(f'cannot be written ({error.strerror})', str(self._folder),
                              'make room, or make the folder writable') from error
-        finally:
-            shutil.rmtree(part, ignore_errors=True)
 
 
 def _digests(folder: Path) -> str:

@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 
 from crgame_ros.analysis.tables.column import Column, INTEGER, TableDeclaration, TEXT
-from crgame_ros.analysis.tables.data_package import data_package, table_schema, WrittenTable
+from crgame_ros.analysis.tables.data_package import data_package, Parent, WrittenTable
 from crgame_ros.analysis.tables.run_tables import TABLES
 from crgame_ros.analysis.tables.writer import Format, NOT_A_NUMBER, TableWriter
 from crgame_ros.errors import InputError
@@ -29,6 +29,7 @@ _WHOSE = (Column('participant', TEXT, '', 'anonymous id of the driver'),
           Column('condition', TEXT, '', 'of the trial'))
 DECLARATIONS = tuple(TableDeclaration(table.name, table.row, table.key, (*_WHOSE, *table.columns))
                      for table in TABLES)
+_PEOPLE = Parent('participants', 'participant')
 # Key in the dictionary that lists the runs of these tables.
 MADE_OF = 'madeOf'
 
@@ -159,26 +160,12 @@ def write_study_data(data: StudyData) -> dict[str, int]:
 
 def _package(written: dict[Format, list[WrittenTable]], study: str) -> dict[str, object]:
     """Return the description of the tables, each with two files of equal content."""
-    package = data_package(written['csv'], 'csv', study)
-    other = data_package(written['parquet'], 'parquet', study)['resources']
+    package = data_package(written['csv'], 'csv', study, _PEOPLE)
+    other = data_package(written['parquet'], 'parquet', study, _PEOPLE)['resources']
     for resource in other:
         resource['name'] += '_parquet'
-    package |= {'title': f'Study: {study}', 'description': DESCRIPTION,
-                'resources': [*package['resources'], *other]}
-    declarations = {table.name: table.declaration for tables in written.values()
-                    for table in tables}
-    for resource in package['resources']:
-        resource['schema'] = _schema(declarations[resource['path']])
-    return package
-
-
-def _schema(declaration: TableDeclaration) -> dict[str, object]:
-    schema = table_schema(declaration)
-    schema.pop('foreignKeys', None)
-    if declaration.key != ('participant',):
-        schema['foreignKeys'] = [{'fields': ['participant'], 'reference': {
-            'resource': 'participants', 'fields': ['participant']}}]
-    return schema
+    return package | {'title': f'Study: {study}', 'description': DESCRIPTION,
+                      'resources': [*package['resources'], *other]}
 
 
 def _json(content: dict[str, object]) -> str:

@@ -205,8 +205,7 @@ def _write(rows: Sequence[Mapping[str, object]], out: Path, study: str) -> None:
     path = folder / FILE
     write_bytes(csv_of_table(table), path)
     package = data_package([WrittenTable(declaration, path, path.name, len(table))], 'csv',
-                           f'{study}-{RERUN}')
-    package['resources'][0]['schema'].pop('foreignKeys', None)
+                           f'{study}-{RERUN}', None)
     write_text(json.dumps(package, indent=1, ensure_ascii=False) + '\n', folder / PACKAGE_FILE)
 
 

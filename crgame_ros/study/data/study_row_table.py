@@ -11,7 +11,7 @@ import re
 from typing import Any
 
 from crgame_ros.analysis.tables.column import Column, FLAG, INTEGER, NUMBER, TableDeclaration, TEXT
-from crgame_ros.analysis.tables.writer import NOT_A_NUMBER
+from crgame_ros.analysis.tables.writer import spelled
 from crgame_ros.study.question import (
     LikertQuestion,
     NumberQuestion,
@@ -113,7 +113,8 @@ def csv_of_table(table: pa.Table) -> bytes:
     stream = io.StringIO(newline='')
     writer = csv.writer(stream)
     writer.writerow(table.column_names)
-    writer.writerows(zip(*(_spelled(column) for column in table.columns), strict=True))
+    writer.writerows(zip(*(spelled(column, is_guarded=False) for column in table.columns),
+                         strict=True))
     return stream.getvalue().encode()
 
 
@@ -134,13 +135,3 @@ def _value(value: Any, kind: pa.DataType) -> Any:
     if kind == NUMBER:
         return float(value)
     return int(value) if kind == INTEGER else bool(value)
-
-
-def _spelled(column: pa.ChunkedArray) -> list[object]:
-    """Return a column's values in the CSV form of `crgame export`."""
-    values: list[object] = column.to_pylist()
-    if column.type == NUMBER:
-        return [NOT_A_NUMBER if value is None else value for value in values]
-    if column.type == pa.bool_():
-        return [None if flag is None else 'TRUE' if flag else 'FALSE' for flag in values]
-    return values
