@@ -30,7 +30,6 @@ MAX_TIME_S = 1e6
 # Number of cached timelines: batches of runs read them many times.
 _KEPT = 32
 REMEDY = 'see docs/driving.md, section "Scripted drivers"'
-_FORM = Form(REMEDY)
 Time = Annotated[float, Within(0.0, MAX_TIME_S)]
 SwitchName = Literal['reverse', 'left_indicator', 'right_indicator', 'horn', 'put_back']
 KeyName = Literal['throttle', 'brake', 'left', 'right', SwitchName]
@@ -161,8 +160,6 @@ class Span:
     :param end: first instant after it [s]
     """
 
-    FORM: ClassVar[Form] = _FORM
-
     start: Annotated[Time, Called('from')]
     end: Annotated[Time, Called('to')]
 
@@ -208,7 +205,7 @@ class JoyEntry:
     :param put_back: intervals in which the vehicle is to be put back on its lane.
     """
 
-    FORM: ClassVar[Form] = Form(REMEDY, first=('axes',))
+    FORM: ClassVar[Form] = Form(first=('axes',))
 
     points: Annotated[tuple[tuple[float, ...], ...], Listed(1)]
     axes: tuple[AxisName, ...] = JOY_AXES
@@ -260,7 +257,7 @@ class TimelineFile:
     :param content: held keys, or the axes of a device.
     """
 
-    FORM: ClassVar[Form] = _FORM
+    FORM: ClassVar[Form] = Form(REMEDY)
 
     content: Annotated[tuple[HeldKeys, ...] | JoyEntry, Keyed(
         {'keys': tuple[HeldKeys, ...], 'joy': JoyEntry}, 'timeline')]

@@ -19,7 +19,6 @@ from crgame_ros.simulation.av_assignment import OWN
 from crgame_ros.yaml_text import read_yaml
 
 MOST_SEEDS = 1_000_000
-_SEE = Form('see docs/evaluation.md for the keys')
 T = TypeVar('T')
 
 
@@ -87,7 +86,7 @@ class EvaluationPlan:
     :param base: directory against which file names are resolved.
     """
 
-    FORM: ClassVar[Form] = _SEE
+    FORM: ClassVar[Form] = Form('see docs/evaluation.md for the keys')
 
     games: Annotated[tuple[str, ...], Listed(noun='file')] = ()
     scenarios: Annotated[tuple[str, ...], Listed(noun='file')] = ()

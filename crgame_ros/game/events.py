@@ -14,7 +14,6 @@ from crgame_ros.schema.marks import Advice, Keyed, Listed, Named, Parts, Within,
 MAX_EVENTS = 100
 # Stands for every agent of traffic.
 ALL_AGENTS = 'all'
-_SEE = 'see docs/games.md for the keys'
 Metres = Annotated[float, Within(0.0, above=True)]
 PutType = Literal['constructionZone', 'parkedVehicle', 'roadBoundary', 'unknown']
 
@@ -26,8 +25,6 @@ class Release:
 
     :param object: obstacle id.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     object: int  # noqa: A003
 
@@ -41,8 +38,6 @@ class Brake:
     :param deceleration: [m/s^2]
     :param speed: [m/s]; an obstacle that is slower keeps its own.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     object: int  # noqa: A003
     deceleration: Annotated[float, Within(0.0, above=True)] = 4.0
@@ -62,8 +57,6 @@ class PutObstacle:
     :param type: CommonRoad's obstacle type.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
-
     x: float
     y: float
     yaw: float = 0.0
@@ -81,8 +74,6 @@ class SpeedLimit:
     :param lanelets: ids of lanelets; all if empty.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
-
     speed: Annotated[float, Within(0.0, 100.0, above=True)]
     lanelets: tuple[int, ...] = ()
 
@@ -95,8 +86,6 @@ class PlanDisplay:
     :param av: its id.
     :param show: whether the plan is shown.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     av: str
     show: bool
@@ -112,8 +101,6 @@ class PlannerSwap:
     :param options: keyword arguments of the planner.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
-
     av: str
     planner: Annotated[str, Named(), Wording(r'[\s\S]+', 'give the name of a planner')]
     options: dict[str, object] = field(default_factory=dict)
@@ -127,8 +114,6 @@ class PlannerRun:
     :param av: its id.
     :param run: whether it runs afterwards.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     av: str
     run: bool
@@ -150,8 +135,6 @@ class TrafficChange:
     :param red_runner: whether it ignores traffic lights.
     :param late_yielder: whether it notices late that it has to yield.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     agent: str
     speed_factor: SpeedFactor | None = None
@@ -254,7 +237,7 @@ class EventSpec:
     :param when: condition under which it fires by itself; None leaves it to triggers.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE, first=('name', 'label'))
+    FORM: ClassVar[Form] = Form('see docs/games.md for the keys', first=('name', 'label'))
 
     name: Annotated[str, Wording('[a-z0-9_-]{1,40}',
                                  'give 1 to 40 of the characters a-z, 0-9, _ and -')]

@@ -54,8 +54,6 @@ class EnvironmentSpec:
         have limits of their own. None keeps the friction of each vehicle's parameters [-].
     """
 
-    FORM: ClassVar[Form] = Form('see docs/games.md for the keys')
-
     light: Light | None = None
     visibility: Annotated[float, Within(10.0, 100_000.0)] | None = None
     friction: Annotated[float, Within(0.05, 2.0)] | None = None
@@ -64,7 +62,6 @@ class EnvironmentSpec:
 DEFAULT_PLANNER = 'idm'
 # Humans and AVs together.
 MAX_VEHICLES = 200
-_SEE = Form('see docs/games.md for the keys')
 Speed = Annotated[float, Within(-100.0, 100.0)]
 
 
@@ -170,8 +167,6 @@ class HumanSpec:
     :param dynamics: the model that moves it; None is the KS model of CRG 2-4.
     """
 
-    FORM: ClassVar[Form] = _SEE
-
     id: Annotated[str, Numbered('hv'), Wording('hv[0-9]{1,3}', 'use hv0, hv1, …')]  # noqa: A003
     driver: Annotated[str, DriverName()] = 'auto'
     vehicle: Annotated[str, Named()] = AUTO
@@ -202,8 +197,6 @@ class AvSpec:
         of the planner's class.
     """
 
-    FORM: ClassVar[Form] = _SEE
-
     id: Annotated[str, Numbered('av'), Wording('av[0-9]{1,3}', 'use av0, av1, …')]  # noqa: A003
     planner: Annotated[str, Named()] = DEFAULT_PLANNER
     options: dict[str, object] = field(default_factory=dict)
@@ -233,8 +226,6 @@ class PredictionSpec:
     :param horizon: H_pred [s].
     """
 
-    FORM: ClassVar[Form] = _SEE
-
     mode: Literal['constant', 'recorded', 'plans'] = 'constant'
     horizon: Annotated[float, Within(0.1, 60.0)] = 3.0
 
@@ -250,8 +241,6 @@ class DrivabilitySpec:
     :param contact: effect of a contact on a vehicle with a human driver: with `through` it drives
         on through the other; with `stop` it stops immediately and can only drive away.
     """
-
-    FORM: ClassVar[Form] = _SEE
 
     collision: bool = True
     road: bool = True
@@ -282,7 +271,7 @@ class TimingSpec:
     :param sample: `interpolate` between plan states, `floor` is CRG 15.
     """
 
-    FORM: ClassVar[Form] = _SEE
+    FORM: ClassVar[Form] = Form('see docs/games.md for the keys')
 
     rate: Annotated[float, Within(1.0, 10000.0)] = 100.0
     pacing: bool = True
@@ -336,7 +325,8 @@ class Game:
     """
 
     FORM: ClassVar[Form] = Form(
-        _SEE.remedy, moved=(('rate', 'timing'),), first=('title', 'scenario', 'duration', 'seed'))
+        'see docs/games.md for the keys', moved=(('rate', 'timing'),),
+        first=('title', 'scenario', 'duration', 'seed'))
 
     scenario: Annotated[Path, ScenarioFile(), Advice('name a CommonRoad file')]
     title: str = ''

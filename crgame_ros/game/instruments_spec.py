@@ -16,7 +16,6 @@ MARKER_KINDS = ('trial', 'event', 'task', 'stimulus', 'shown', 'answer', 'missed
                 'contact', 'marker')
 # A trigger is one byte, and amplifiers take 0 for none.
 LARGEST_CODE = 255
-_SEE = 'see docs/instruments.md for the keys'
 _CODES = f'give whole numbers from 1 to {LARGEST_CODE}, such as {{stimulus: 1, take_over: 2}}'
 # Quotes would end the text in a query of liblsl.
 StreamText = Annotated[str, Wording(
@@ -68,7 +67,7 @@ class GazeSpec:
         device [deg]
     """
 
-    FORM: ClassVar[Form] = Form(_SEE, short='stream')
+    FORM: ClassVar[Form] = Form(short='stream')
 
     stream: StreamText
     seat: Annotated[str | None, LeftOut()] = None
@@ -100,8 +99,6 @@ class TriggerSpec:
     :param codes: byte by marker, or by the words with which markers begin; the longest that fits
         counts.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     codes: Annotated[dict[str, object], Advice(_CODES)]
     port: Annotated[str, Wording(r'/[^\x00-\x1f]{1,200}', 'name a device, such as /dev/ttyUSB0')
@@ -157,7 +154,7 @@ class InstrumentsSpec:
         which speaks multicast.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
+    FORM: ClassVar[Form] = Form('see docs/instruments.md for the keys')
 
     outlets: bool = False
     inlets: Annotated[tuple[InletSpec, ...], Listed(0, MAX_INLETS, 'stream')] = ()

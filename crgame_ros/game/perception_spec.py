@@ -13,7 +13,6 @@ DEFAULT_SENSOR_MODEL = 'ray-caster'
 MAX_SENSORS = 32
 # A filter's gain needs some noise in every measurement.
 _LEAST_NOISE = 1e-6
-_SEE = 'see docs/perception.md for the keys'
 Name = Annotated[str, Numbered('sensor'), Wording(
     '[a-z][a-z0-9_]{0,31}', 'begin with a-z and use a-z, 0-9 and _ only, 32 at most')]
 Metres = Annotated[float, Within(-50.0, 50.0)]
@@ -88,7 +87,7 @@ class SensorSpec:
     :param options: further constructor arguments of a model of the user's own
     """
 
-    FORM: ClassVar[Form] = Form(_SEE, written='all')
+    FORM: ClassVar[Form] = Form('see docs/perception.md for the keys', written='all')
 
     name: Name
     model: Annotated[str, Named()] = DEFAULT_SENSOR_MODEL

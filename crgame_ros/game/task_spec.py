@@ -12,7 +12,6 @@ from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Advice, Keyed, LeftOut, Listed, Parts, Within, Wording
 
 MAX_TASKS = 20
-_SEE = 'see docs/games.md for the keys'
 TaskKind = Literal['detection_response', 'take_over', 'secondary_task']
 # The key of an answer, and that of a request whose driver answers lights as well.
 ANSWER_KEY, SECOND_KEY = 'Enter', 'KeyT'
@@ -38,8 +37,6 @@ class DetectionResponse:
     :param button: of a gamepad or wheel that answers it, from 0; by default any that has no other
         meaning, and the first such one if its driver may be asked to take over, too.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     interval: Annotated[tuple[float, float], Parts(('shortest', 'longest')), Within(0.5, 600.0),
                         Advice('give two times')] = (3.0, 5.0)
@@ -76,8 +73,6 @@ class TakeOverPrompt:
         meaning.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
-
     lead: Annotated[float, Within(0.0, 600.0)] = 5.0
     before: str | None = None
     shown: Annotated[float, Within(0.0, 600.0)] = 5.0
@@ -92,8 +87,6 @@ class SecondaryTask:
 
     :param show: whether the label is shown to the driver during the task.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     show: bool = False
 
@@ -133,7 +126,7 @@ class TaskSpec:
         end of the run.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE, first=('name', 'label'))
+    FORM: ClassVar[Form] = Form('see docs/games.md for the keys', first=('name', 'label'))
 
     name: Annotated[str, Wording('[a-z0-9_-]{1,40}',
                                  'give 1 to 40 of the characters a-z, 0-9, _ and -')]

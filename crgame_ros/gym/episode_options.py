@@ -29,8 +29,6 @@ class Start:
     :param along: shift along the route [m]
     """
 
-    FORM: ClassVar[Form] = Form('see docs/gym.md for the keys')
-
     speed: Annotated[float, Within(-50.0, 50.0)] = 0.0
     along: Annotated[float, Within(-100.0, 100.0)] = 0.0
 

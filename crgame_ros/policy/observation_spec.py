@@ -89,8 +89,6 @@ class Depths:
     :param image: likewise.
     """
 
-    FORM: ClassVar[Form] = Form('see docs/gym.md for the keys')
-
     state: Depth = 1
     route: Depth = 1
     objects: Depth = 1

@@ -44,7 +44,8 @@ class Form:
     A method `check` of the dataclass may check conditions that types cannot express. It raises an
     InputError that names no place.
 
-    :param remedy: remedy in the message about a value that is not a mapping.
+    :param remedy: remedy in the message about a value that is not a mapping; without one, that of
+        the mapping around it.
     :param short: key for which a plain text may be written instead of the mapping.
     :param rest: field that receives all keys that are not fields.
     :param moved: keys that may be written here although they belong to a section: key, section.

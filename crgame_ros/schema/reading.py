@@ -112,6 +112,8 @@ class _Reader:
 
     def __init__(self, base: Path) -> None:
         self._base = base
+        # Of the mapping that is read, or of the next one around it.
+        self._remedy = ''
 
     def value(self, hint: object, marks: tuple[object, ...], given: object, key: str, where: str,
               index: int | None = None) -> Any:
@@ -141,12 +143,20 @@ class _Reader:
 
     def mapping(self, kind: Any, marks: tuple[object, ...], given: object, where: str,
                 index: int | None = None) -> object:
+        around, self._remedy = self._remedy, form_of(kind).remedy or self._remedy
+        try:
+            return self._mapping(kind, marks, given, where, index)
+        finally:
+            self._remedy = around
+
+    def _mapping(self, kind: Any, marks: tuple[object, ...], given: object, where: str,
+                 index: int | None) -> object:
         form = form_of(kind)
         if form.short is not None and isinstance(given, str):
             given = {form.short: given}
         if not isinstance(given, Mapping):
             asked = mark_of(marks, Advice)
-            raise InputError('is no mapping', where, asked.remedy if asked else form.remedy)
+            raise InputError('is no mapping', where, asked.remedy if asked else self._remedy)
         values = moved(form, given)
         wrong = _Wrong()
         with wrong:

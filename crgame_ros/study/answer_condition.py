@@ -7,11 +7,8 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from crgame_ros.errors import InputError
-from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Within, Wording
 from crgame_ros.study.local_text import BESIDE, ColumnName
-
-_SEE = 'see docs/studies.md for the keys'
 
 
 @dataclass(frozen=True)
@@ -104,7 +101,6 @@ class AnswerCondition(QuestionTest):
     :param field: name of a field of the participant, instead of a question.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
     ELSE: ClassVar[str] = 'field'
 
     field: ColumnName | None = None
@@ -152,8 +148,6 @@ class Exclusion:
     :param page: Markdown that the participant reads at the end; `NAME.de.md` is the German
         version.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     when: AnswerCondition | None = None
     attention_failed: Annotated[int, Within(1, 1000)] | None = None

@@ -7,10 +7,9 @@ import hmac
 from pathlib import Path
 import re
 import secrets
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from crgame_ros.errors import InputError
-from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Wording
 from crgame_ros.whole_file import write_bytes
 
@@ -34,8 +33,6 @@ class Elsewhere:
     :param screen_out_code: shown to participants who are excluded; by default no code is.
     :param completed_address: where a link leads at the end; `{code}` stands for the code.
     """
-
-    FORM: ClassVar[Form] = Form('see docs/studies.md for the keys')
 
     id_from: Annotated[str, Wording('[A-Za-z][A-Za-z0-9_]{0,39}',
                                     'begin with a letter, then letters, digits and _')]

@@ -24,8 +24,6 @@ from crgame_ros.study.trial_order import OrderKind
 from crgame_ros.study.trial_settings import Factor, NOTHING, TrialSettings
 from crgame_ros.yaml_text import read_yaml
 
-_SEE = 'see docs/studies.md for the keys'
-
 
 @dataclass(frozen=True)
 class Retention:
@@ -35,8 +33,6 @@ class Retention:
     :param until: a date, the last day.
     :param months: after the last entry of the participant's session.
     """
-
-    FORM: ClassVar[Form] = Form('see docs/studies.md for the keys')
 
     until: Annotated[str, Wording('[0-9]{4}-[0-9]{2}-[0-9]{2}',
                                   'give a date such as 2030-12-31')] | None = None
@@ -76,7 +72,7 @@ class Page:
     :param version: of a consent, as people name it; it is noted with a digest of the text.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE, short='file')
+    FORM: ClassVar[Form] = Form(short='file')
 
     file: Annotated[str, Wording(rf'{BESIDE}\.md', 'name a Markdown file beside this one')]
     consent: bool = False
@@ -91,7 +87,7 @@ class Questions:
     :param name: of a standard one, or a YAML file beside the study's.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE, short='name')
+    FORM: ClassVar[Form] = Form(short='name')
 
     name: Annotated[str, Wording(BESIDE, 'name a questionnaire, or a YAML file beside this one')]
 
@@ -105,8 +101,6 @@ class Break:
     :param text: shown to the participant.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
-
     minutes: Annotated[float, Within(0.0, 240.0)] = 0.0
     text: Text = LocalText()
 
@@ -118,8 +112,6 @@ class DeviceCheck:
 
     :param text: what people read.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     text: Text = LocalText()
 
@@ -137,8 +129,6 @@ class StepEntry:
     :param step: the step.
     :param groups: only for these groups; for all by default.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     step: Annotated[Step, Keyed(STEPS, 'step')]
     groups: Annotated[tuple[str, ...], Listed(noun='group')] = ()
@@ -158,8 +148,6 @@ class Practice:
         until one is good.
     :param seconds: time without a collision or leaving the road that makes a drive good [s]
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     settings: TrialSettings = NOTHING
     at_least: Annotated[int, Within(1, 50)] = 1
@@ -193,8 +181,6 @@ class Block:
     :param break_minutes: minimum duration of the break.
     :param after: steps after it.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     name: Name
     factors: Annotated[tuple[str, ...], Listed(noun='factor')] | None = None
@@ -265,7 +251,7 @@ class StudyFile:
     :param base: directory against which file names are resolved.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
+    FORM: ClassVar[Form] = Form('see docs/studies.md for the keys')
 
     name: Name
     blocks: Annotated[tuple[Block, ...], Listed(1, 50, 'block', 'name')]

@@ -20,8 +20,6 @@ from crgame_ros.study.session_journal import JournalEntry, read_journal, Session
 from crgame_ros.study.trial_order import shuffled
 from crgame_ros.study.trial_settings import Factor, Level
 
-_SEE = 'see docs/studies.md for the keys'
-
 AllocationKind = Literal['permuted_blocks', 'minimisation', 'field', 'given']
 
 
@@ -34,7 +32,7 @@ class Stratifier:
     :param cuts: of a number, in rising order: a stratum begins at each.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE, short='field')
+    FORM: ClassVar[Form] = Form(short='field')
 
     field: ColumnName
     cuts: Annotated[tuple[float, ...], Listed(0, 20, 'cut')] = ()
@@ -94,8 +92,6 @@ class Groups:
     :param field: that decides: a choice named as the groups are, or a number whose ranges between
         the cuts are the groups in their order.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     name: ColumnName
     levels: Annotated[tuple[Level, ...], Listed(2, 20, 'group', 'name')]

@@ -4,15 +4,12 @@
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from crgame_ros.errors import InputError
-from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Within
 from crgame_ros.study.local_text import ColumnName
 from crgame_ros.study.trial_settings import Factor
-
-_SEE = 'see docs/studies.md for the keys'
 
 Alternative = Literal['two-sided', 'less', 'greater']
 
@@ -35,8 +32,6 @@ class Comparison:
         that of the participants' means in a group.
     :param alternative: hypothesis about the difference.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     measure: ColumnName
     factor: ColumnName
@@ -89,8 +84,6 @@ class PlannedAnalysis:
         of each comparison.
     :param flagged: whether trials beyond a bound of `quality` are used.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     comparisons: Annotated[tuple[Comparison, ...], Listed(0, 50, 'comparison')] = ()
     alpha: Annotated[float, Within(0.0001, 0.5)] = 0.05

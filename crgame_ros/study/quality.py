@@ -4,9 +4,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
-from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Within
 
 Bound = Annotated[float, Within(0.0)] | None
@@ -36,8 +35,6 @@ class QualityBounds:
         Both judge what is known when a drive ends: all but gaps, input_delay_s, plans_of_others.
     :param repeats: how often `repeat` repeats a drive, before it is marked.
     """
-
-    FORM: ClassVar[Form] = Form('see docs/studies.md for the keys')
 
     max_cumulative_error_s: Bound = 0.1
     timeout_ratio: Bound = 0.01

@@ -14,7 +14,6 @@ from crgame_ros.schema.marks import Advice, Keyed, Listed, Within
 from crgame_ros.study.answer_condition import AnswerCondition, holds_for, is_one_of
 from crgame_ros.study.local_text import ColumnName, LocalText, Text
 
-_SEE = 'see docs/studies.md for the keys'
 MOST_CHARACTERS = 20_000
 # A limit that is not set is that far away.
 _UNLIMITED = 1e9
@@ -31,8 +30,6 @@ class LikertQuestion:
     :param right: label of the last.
     :param labels: label of each, instead of `left` and `right`.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     points: Annotated[int, Within(2, 11)] = 7
     left: Text = LocalText()
@@ -68,8 +65,6 @@ class SliderQuestion:
     :param right: label of the right end.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
-
     low: float = 0.0
     high: float = 100.0
     step: Annotated[float, Within(0.0, above=True)] = 1.0
@@ -101,8 +96,6 @@ class VasQuestion:
     :param right: label of the right end, 100.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
-
     left: Text = LocalText()
     right: Text = LocalText()
 
@@ -124,8 +117,6 @@ class ChoiceQuestion:
     :param choices: names of the answers, with the displayed texts.
     :param several: whether more than one, or none, may be chosen.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     choices: dict[str, object]
     several: bool = False
@@ -164,8 +155,6 @@ class NumberQuestion:
     :param unit: displayed after it.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
-
     low: float = -_UNLIMITED
     high: float = _UNLIMITED
     whole: bool = False
@@ -197,8 +186,6 @@ class TextQuestion:
     :param longest: maximum number of characters.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
-
     longest: Annotated[int, Within(1, MOST_CHARACTERS)] = 10_000
 
     def refusal(self, answer: object) -> str:
@@ -227,7 +214,7 @@ class Question:
     :param expect: the answer of people who attend: it is an attention check.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE, first=('name', 'ask'))
+    FORM: ClassVar[Form] = Form(first=('name', 'ask'))
 
     name: ColumnName
     kind: Annotated[QuestionKind, Keyed(KINDS, 'kind of answer')]

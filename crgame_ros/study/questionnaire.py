@@ -22,7 +22,6 @@ from crgame_ros.study.trial_order import shuffled
 from crgame_ros.yaml_text import read_yaml
 
 SCALES = Path(__file__).resolve().parent / 'scales'
-_SEE = 'see docs/studies.md for the keys'
 
 
 @dataclass(frozen=True)
@@ -40,8 +39,6 @@ class Score:
     :param shift: added to the result, after the factor.
     :param pairs: names of the questions that choose between two items, for `tally`.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     name: ColumnName
     items: Annotated[tuple[str, ...], Listed(1, noun='item')]
@@ -109,7 +106,7 @@ class Questionnaire:
     :param scores: of the answers.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
+    FORM: ClassVar[Form] = Form('see docs/studies.md for the keys')
 
     name: ColumnName
     questions: Annotated[tuple[Question, ...], Listed(1, 200, 'question', 'name')]

@@ -10,13 +10,11 @@ import statistics
 from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.errors import InputError
-from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Within, Wording
 from crgame_ros.study.answer_condition import QuestionTest
 from crgame_ros.study.local_text import ColumnName, Name
 from crgame_ros.study.trial_settings import Factor
 
-_SEE = 'see docs/studies.md for the keys'
 EndReason = Literal['reversals', 'at_most']
 # How a drive ends: by its duration, by the own vehicle's violation, or by that of another one.
 OUTCOMES = ('time', 'collision', 'off_road', 'other')
@@ -33,7 +31,6 @@ class Success(QuestionTest):
         or departures from the road.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
     ELSE: ClassVar[str] = 'drive'
 
     drive: Literal['outcome', 'contacts', 'departures'] | None = None
@@ -65,8 +62,6 @@ class StopRule:
     :param success: what makes a trial a success.
     :param in_a_row: number of successes.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     success: Success
     in_a_row: Annotated[int, Within(1, 100)] = 3
@@ -100,8 +95,6 @@ class StaircaseStop:
     :param at_most: number of trials, those that were left out among them.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE)
-
     reversals: Annotated[int, Within(2, 100)] = 8
     at_most: Annotated[int, Within(2, 500)] = 40
 
@@ -123,8 +116,6 @@ class Staircase:
         numbers, otherwise 1, 2, 3 …
     :param stop: when it ends.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     factor: ColumnName
     success: Success

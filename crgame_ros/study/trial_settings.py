@@ -16,8 +16,6 @@ from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Named, Within, Wording
 from crgame_ros.study.local_text import ColumnName, LocalText, Name
 
-_SEE = 'see docs/studies.md for the keys'
-
 
 @dataclass(frozen=True)
 class TrialSettings:
@@ -51,8 +49,6 @@ class TrialSettings:
     :param labels: texts of tasks that the participant reads instead of their `label`, by the
         task's name: one text, or one for each language.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     game: Annotated[str, Named(), Wording(r'[\s\S]+', 'name a game file')] | None = None
     scenario: Path | None = None
@@ -134,7 +130,7 @@ class Level:
     :param settings: of its trials.
     """
 
-    FORM: ClassVar[Form] = Form(_SEE, rest='settings')
+    FORM: ClassVar[Form] = Form(rest='settings')
 
     name: Name
     settings: TrialSettings = NOTHING
@@ -148,8 +144,6 @@ class Factor:
     :param name: of its column in tables.
     :param levels: its levels, in the order of the file.
     """
-
-    FORM: ClassVar[Form] = Form(_SEE)
 
     name: ColumnName
     levels: Annotated[tuple[Level, ...], Listed(2, 50, 'level', 'name')]
