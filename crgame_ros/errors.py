@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The exceptions of the package: each message says what is wrong, where, and what to do."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 import reprlib
 
 # Messages are shown in a terminal, a log or a small window [characters].
@@ -40,6 +42,15 @@ class InputError(CrgameError):
             where = where if len(where) <= room else f'…{where[1 - room:]}'
         text = f'{where}: {what}' if where else what
         super().__init__(f'{text}; {remedy}' if remedy else text)
+
+
+@contextmanager
+def refusing(what: str, where: object, remedy: str = '') -> Iterator[None]:
+    """Raise an `InputError` with the system's reason in place of an `OSError`."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f'{what} ({error.strerror})', str(where), remedy) from error
 
 
 def short(value: object) -> str:

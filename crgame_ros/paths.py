@@ -12,7 +12,7 @@ import sys
 import tempfile
 from typing import Literal
 
-from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.errors import CrgameError, InputError, refusing
 
 PACKAGE = 'crgame_ros'
 
@@ -89,10 +89,8 @@ def make_folder(folder: Path, remedy: str) -> None:
 
     :raises InputError: if it cannot be made.
     """
-    try:
+    with refusing('cannot be made', folder, remedy):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f'cannot be made ({error.strerror})', str(folder), remedy) from error
 
 
 def extra_install(extra: str) -> str:

@@ -160,7 +160,8 @@ def _say(text: str) -> None:
 
 def _make_folder(out: Path | None, run: Path) -> Path:
     """Create a new folder; existing files stay as they are."""
-    wanted = out or (run if run.is_dir() else run.parent) / FOLDER
+    from crgame_ros.recording.run_folder import recording_in
+    wanted = out or recording_in(run).parent / FOLDER
     folder = wanted
     try:
         wanted.parent.mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 import shutil
 
-from crgame_ros.errors import InputError
+from crgame_ros.errors import refusing
 
 
 def write_text(text: str, path: Path) -> None:
@@ -23,11 +23,8 @@ def write_text(text: str, path: Path) -> None:
 
 def write_bytes(content: bytes, path: Path) -> None:
     """Write a file as `write_text` does."""
-    try:
+    with refusing('cannot be written', path, 'choose a folder that can be written'):
         write_whole(content, path)
-    except OSError as error:
-        raise InputError(f'cannot be written ({error.strerror})', str(path),
-                         'choose a folder that can be written') from error
 
 
 def write_whole(content: bytes, path: Path) -> None:
@@ -51,11 +48,20 @@ def whole_file(path: Path, suffix: str = '.part') -> Iterator[Path]:
     part = part_of(path, suffix)
     try:
         yield part
-        _sync(part, os.O_RDONLY)
-        part.replace(path)
-        sync_folder(path.parent)
+        name_whole(part, path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def name_whole(part: Path, path: Path) -> None:
+    """
+    Give a file that has been written its name, once all of it is on the disk.
+
+    :raises OSError: if it cannot be renamed; an existing file is unchanged.
+    """
+    _sync(part, os.O_RDONLY)
+    part.replace(path)
+    sync_folder(path.parent)
 
 
 @contextmanager

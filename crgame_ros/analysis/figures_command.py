@@ -86,8 +86,7 @@ def figures(values: argparse.Namespace) -> int:
         if not run.vehicles and (values.video or {'frames', 'profiles'} & set(wanted)):
             raise InputError('has no driven vehicle to draw', str(path), 'name another run')
     first = values.runs[0]
-    # A recording is in the folder of its run.
-    folder = values.out or (first if recording_in(first) != first else first.parent) / FOLDER
+    folder = values.out or recording_in(first).parent / FOLDER
     for number, run in enumerate(runs):
         # With several runs, each run's own figures are in a separate folder.
         own = folder / _name(number, runs) if len(runs) > 1 else folder

@@ -12,7 +12,7 @@ import re
 from typing import Any
 
 from crgame_ros.driver.source import parse_source
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 from crgame_ros.evaluation.content import Content, ContentStore
 from crgame_ros.evaluation.source_digest import code_neighbours, MOST_BYTES, planner_digest
 from crgame_ros.game.game import Game, load_game
@@ -250,11 +250,8 @@ def _files(file: Path, key: str) -> Iterator[tuple[str, bytes]]:
                          str(file), 'install the planner where the workers are, and name it '
                          'module:Class')
     for each in files:
-        try:
+        with refusing('cannot be read', each, 'check the path'):
             yield each.relative_to(file.parent).as_posix(), each.read_bytes()
-        except OSError as error:
-            raise InputError(f'cannot be read ({error.strerror})', str(each),
-                             'check the path') from error
 
 
 def files_of(names: tuple[str, ...], base: Path, suffixes: tuple[str, ...],

@@ -11,7 +11,7 @@ import tempfile
 from typing import NamedTuple
 import zlib
 
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 from crgame_ros.whole_file import write_bytes
 
 # Prefix of a reference to a file in the store, followed by its digest and its original name.
@@ -76,7 +76,8 @@ class ContentStore:
         place = self.folder / digest
         if place.is_dir():
             return digest
-        try:
+        with refusing('cannot be written', place,
+                      'choose a folder that can be written, on a disk with room'):
             self.folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(dir=self.folder, prefix='.part-') as part:
                 whole = Path(part) / digest
@@ -91,9 +92,6 @@ class ContentStore:
                 # Another process may have stored it in the meantime.
                 if not place.is_dir():
                     _rename(whole, place)
-        except OSError as error:
-            raise InputError(f'cannot be written ({error.strerror})', str(place),
-                             'choose a folder that can be written, on a disk with room') from error
         return digest
 
     def packed(self, digest: str) -> dict[str, bytes]:
@@ -102,16 +100,13 @@ class ContentStore:
 
         :raises InputError: if there is no such content.
         """
-        try:
-            place = self.folder / digest
+        place = self.folder / digest
+        with refusing('a file of the evaluation cannot be read', place,
+                      'start the evaluation anew in another folder'):
             place.stat()
             return {path.relative_to(place).as_posix(): zlib.compress(path.read_bytes(), 6)
                     for path in sorted(place.rglob('*')) if path.is_file()
                     and path.parent.name != '__pycache__'}
-        except OSError as error:
-            raise InputError(f'a file of the evaluation cannot be read ({error.strerror})',
-                             str(self.folder / digest), 'start the evaluation anew in another '
-                             'folder') from error
 
     def unpack(self, digest: str, packed: Mapping[str, bytes]) -> None:
         """Store the result of `packed`; an existing content is left unchanged."""

@@ -11,7 +11,7 @@ from typing import Any
 
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.analysis.tables.data_package import PROFILE, table_schema
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_grid import CellGrid
 from crgame_ros.evaluation.content import ContentStore
@@ -77,15 +77,12 @@ class EvaluationFolder:
         :raises InputError: if the folder cannot be written.
         """
         path = self.path / VARIANTS_FILE
-        try:
+        with refusing('cannot be written', path, 'check the folder and the space in it'):
             with path.open('a', encoding='utf-8') as stream:
                 # The line break comes first: it ends a line that was cut off.
                 stream.write(''.join('\n' + json.dumps(each) for each in variants))
                 stream.flush()
                 os.fsync(stream.fileno())
-        except OSError as error:
-            raise InputError(f'cannot be written ({error.strerror})', str(path),
-                             'check the folder and the space in it') from error
 
     def find(self, key: str) -> Cell:
         """

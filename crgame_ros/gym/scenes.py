@@ -8,7 +8,7 @@ from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 from crgame_ros.game.game import Game, HumanSpec, load_game
 from crgame_ros.gym.episode_options import game_at
 from crgame_ros.gym.episode_setups import EpisodeSetups, StartVariation
@@ -171,12 +171,9 @@ def _file(game: Path | str) -> Path:
 
 
 def _check_head(path: Path) -> None:
-    try:
+    with refusing('cannot be read', path, 'check the file'):
         with path.open('rb') as stream:
             found = header_id(stream.read(HEAD_BYTES))
-    except OSError as error:
-        raise InputError(f'cannot be read ({error.strerror})', str(path),
-                         'check the file') from error
     if found is None:
         raise InputError('is no CommonRoad scenario', str(path), 'move it out of the folder')
 

@@ -19,7 +19,7 @@ from typing import Any, IO, NamedTuple
 import zipfile
 import zlib
 
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 from crgame_ros.library.stored_index import (
     digest_of,
     Entry,
@@ -90,11 +90,8 @@ class FolderIndex:
         :raises InputError: if it cannot be read.
         """
         path = self.path_of(entry)
-        try:
+        with refusing('cannot be read', path, 'check the permissions'):
             return digest_of(path.read_bytes())
-        except OSError as error:
-            raise InputError(f'cannot be read ({error.strerror})', str(path),
-                             'check the permissions') from error
 
     def is_current(self, entry: Entry) -> bool:
         """Return whether a scenario is still there, with the same id in it."""

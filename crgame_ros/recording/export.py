@@ -12,7 +12,7 @@ from typing import Any
 
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.scenario import ScenarioID
-from crgame_ros.errors import InputError, one_line
+from crgame_ros.errors import InputError, one_line, refusing
 from crgame_ros.game.objects import Role
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.paths import check_room
@@ -265,14 +265,11 @@ def prepare_folder(out: Path) -> None:
     if is_file and out.exists():
         # Refuse a bad path now, not after the run.
         scenario_path(out, '', out.suffix)
-    try:
+    with refusing('cannot be written to', folder, 'choose another folder'):
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         check_room(folder)
-    except OSError as error:
-        raise InputError(f'cannot be written to ({error.strerror})', str(folder),
-                         'choose another folder') from error
 
 
 def _header(log: RunTrajectories, loaded: LoadedScenario, problems: int,

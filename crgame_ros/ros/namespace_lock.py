@@ -8,7 +8,7 @@ import fcntl
 import os
 from pathlib import Path
 
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 
 # Where every shell of a user looks, whatever its TMPDIR is, and where a full disk is no hindrance.
 FOLDER = Path('/tmp')
@@ -24,11 +24,8 @@ def hold_namespace(domain: str, namespace: str) -> Iterator[None]:
     """
     name = f'crgame-{os.getuid()}-{domain}{namespace.rstrip("/").replace("/", ".")}.lock'
     path = FOLDER / name
-    try:
+    with refusing('cannot be opened', path, 'remove it'):
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-    except OSError as error:
-        raise InputError(f'cannot be opened ({error.strerror})', str(path),
-                         'remove it') from error
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

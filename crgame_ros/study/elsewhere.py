@@ -9,7 +9,7 @@ import re
 import secrets
 from typing import Annotated
 
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 from crgame_ros.schema.marks import Wording
 from crgame_ros.whole_file import write_bytes
 
@@ -69,11 +69,8 @@ def private_folder(root: Path) -> Path:
     :raises InputError: if it cannot be created.
     """
     folder = root / PRIVATE
-    try:
+    with refusing('cannot be made', folder, 'choose another folder with --out'):
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-    except OSError as error:
-        raise InputError(f'cannot be made ({error.strerror})', str(folder),
-                         'choose another folder with --out') from error
     return folder
 
 

@@ -10,7 +10,7 @@ import re
 import tempfile
 
 from crgame_ros.driver.source import COCKPIT
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 from crgame_ros.evaluation.cell_scene import values_of_game
 from crgame_ros.evaluation.content import ContentStore, digests_in
 from crgame_ros.recording.run_folder import PARTICIPANTS, STUDY_FILE
@@ -192,7 +192,7 @@ class StudyFolder:
         folder = (self.root / STUDY_FILE).parent
         files = {STUDY_FILE.name: file,
                  **{name: study.base / name for name in (*_beside(study), *pictures)}}
-        try:
+        with refusing('cannot be kept', folder, 'choose another folder with --out'):
             for name, path in files.items():
                 kept = folder / name
                 content = path.read_bytes()
@@ -204,9 +204,6 @@ class StudyFolder:
                                      f'put it back as {kept} has it, or begin a new study with '
                                      'another --out')
             keep_drives(study, folder)
-        except OSError as error:
-            raise InputError(f'cannot be kept ({error.strerror})', str(folder),
-                             'choose another folder with --out') from error
 
 
 def _beside(study: StudyFile) -> list[str]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import random
 from typing import Annotated, Any, ClassVar, Literal
 
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Within
 from crgame_ros.study.local_text import ColumnName
@@ -326,11 +326,8 @@ def enrolling(participants: Path) -> Iterator[None]:
     :param participants: folder with a folder of each; must exist.
     :raises InputError: if it cannot be locked.
     """
-    try:
+    with refusing('cannot be opened', participants, 'make the folder readable'):
         held = os.open(participants, os.O_RDONLY | os.O_DIRECTORY)
-    except OSError as error:
-        raise InputError(f'cannot be opened ({error.strerror})', str(participants),
-                         'make the folder readable') from error
     try:
         # Others hold it for as long as it takes to read the journals and to add a line.
         fcntl.flock(held, fcntl.LOCK_EX)

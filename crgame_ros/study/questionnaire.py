@@ -10,7 +10,7 @@ import math
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed
 from crgame_ros.schema.reading import read
@@ -214,10 +214,8 @@ def consent_of(study: StudyFile, page: Page, language: str) -> dict[str, str]:
     :raises InputError: if the file cannot be read.
     """
     file = page_file(study, page, language)
-    try:
+    with refusing('cannot be read', file, 'put it back'):
         content = b'' if file is None else file.read_bytes()
-    except OSError as error:
-        raise InputError(f'cannot be read ({error.strerror})', str(file), 'put it back') from error
     return {'file': page.file if file is None else file.name, 'version': page.version,
             'sha256': hashlib.sha256(content).hexdigest(), 'language': language}
 

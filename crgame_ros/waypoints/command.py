@@ -8,7 +8,7 @@ from pathlib import Path
 import sys
 from typing import Literal
 
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 
 # Greatest number of lanes whose cuts are printed.
 _TOLD = 10
@@ -147,11 +147,8 @@ def _check_target(path: Path, force: bool) -> None:
 
 
 def _make_folder(path: Path) -> None:
-    try:
+    with refusing('cannot make its folder', path, 'choose another place'):
         path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f'cannot make its folder ({error.strerror})', str(path),
-                         'choose another place') from error
 
 
 def _note(text: str) -> None:

@@ -14,7 +14,7 @@ from itertools import islice
 from pathlib import Path
 import re
 
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 from crgame_ros.worlds.kinds import HIGHD, INTERACTION, MONA, SIND, TUMDOT, WorldKind
 
 _HIGHD_TRACKS = ('frame id x y width height xVelocity yVelocity xAcceleration yAcceleration',
@@ -192,11 +192,9 @@ def _is_filled(path: Path, columns: str) -> bool:
     """
     if path.suffix == '.parquet':
         return True
-    try:
+    with refusing('cannot be read', path):
         with path.open(encoding='utf-8-sig', errors='replace') as table:
             header, first = [*islice(table, 2), '', ''][:2]
-    except OSError as error:
-        raise InputError(f'cannot be read ({error.strerror})', str(path)) from error
     if header.strip():
         names = {name.strip().strip('"') for name in header.split(',')}
         missing = [name for name in columns.split() if name not in names]

@@ -53,5 +53,5 @@ def report(values: argparse.Namespace) -> int:
 
 def _place(path: Path) -> Path:
     """Return the path of a run's report: in its folder, or beside a single recording."""
-    folder = path if (path / 'bag').is_dir() else path.parent
-    return folder / REPORT_FILE
+    from crgame_ros.recording.run_folder import recording_in
+    return recording_in(path).parent / REPORT_FILE

@@ -34,7 +34,7 @@ from crgame_ros.analysis.tables.writer import (
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import prepare_folder
 from crgame_ros.recording.run_folder import PACKAGE_FILE, recording_in
-from crgame_ros.whole_file import part_of, write_text
+from crgame_ros.whole_file import name_whole, part_of, write_text
 import pyarrow as pa
 
 _LARGEST_PACKAGE = 10_000_000
@@ -105,7 +105,7 @@ class TableFolder:
         for name in self._earlier - {*self._names.values(), PACKAGE_FILE}:
             (self._out / name).unlink(missing_ok=True)
         for file in written:
-            file.path.replace(self._out / file.name)
+            name_whole(file.path, self._out / file.name)
         write_text(json.dumps(package, indent=1, ensure_ascii=False, allow_nan=False) + '\n',
                    self._out / PACKAGE_FILE)
 

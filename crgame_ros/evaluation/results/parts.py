@@ -22,7 +22,7 @@ from crgame_ros.evaluation.results.cell_rows import (
     TABLES_OF_CELLS,
     VEHICLES_OF_CELLS,
 )
-from crgame_ros.whole_file import write_whole
+from crgame_ros.whole_file import name_whole, write_whole
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -340,11 +340,9 @@ def _replace_part(folder: Path, name: str,
         path = folder / table.name / name
         part = path.with_suffix(f'.{os.getpid()}.part')
         write(table, part)
-        with part.open('rb') as stream:
-            os.fsync(stream.fileno())
         written.append((part, path))
     for part, path in written:
-        part.replace(path)
+        name_whole(part, path)
 
 
 def _move(source: Path, name: str, target: Path, chosen: Callable[[str, str], bool]) -> int:

@@ -13,7 +13,7 @@ from urllib.parse import urlencode
 
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.driver.source import COCKPIT
-from crgame_ros.errors import InputError
+from crgame_ros.paths import make_folder
 from crgame_ros.study.drive_watch import DrivePhase, DriveState, DriveWatch
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.quality import Excess, PAGE, TIMING
@@ -175,11 +175,7 @@ def write_drive(item: SessionItem, games: Path) -> StudyDrive | None:
         return None
     game = trial_game(settings, COCKPIT)
     path = games / f'{item.id.replace("/", "_")}.yaml'
-    try:
-        games.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f'cannot be made ({error.strerror})', str(games),
-                         'choose a folder that can be written') from error
+    make_folder(games, 'choose a folder that can be written')
     write_text(game.dump(), path)
     return StudyDrive(item, settings, seats_of(settings, game), path)
 

@@ -14,7 +14,7 @@ from typing import Any
 from crgame_ros.analysis.behaviour.task_events import task_events
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.run_tables import tables_of
-from crgame_ros.errors import InputError
+from crgame_ros.errors import refusing
 from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.recording.run_folder import bags_of
 from crgame_ros.whole_file import whole_folder
@@ -85,7 +85,7 @@ class RunTablesCache:
         tabulated = Run.of_recording(run, progress=progress)
         tabulated.id = name
         tables = tables_of([tabulated])
-        try:
+        with refusing('cannot be written', self._folder, 'make room, or make the folder writable'):
             self._folder.mkdir(parents=True, exist_ok=True)
             # A power cut may leave files without content: their hashes differ.
             with whole_folder(folder) as part:
@@ -95,9 +95,6 @@ class RunTablesCache:
                 text = json.dumps(_summary(tabulated), indent=1, ensure_ascii=False)
                 (part / SUMMARY).write_text(text + '\n', encoding='utf-8')
                 (part / DIGESTS).write_text(_digests(part), encoding='utf-8')
-        except OSError as error:
-            raise InputError(f'cannot be written ({error.strerror})', str(self._folder),
-                             'make room, or make the folder writable') from error
 
 
 def _digests(folder: Path) -> str:
@@ -142,11 +139,8 @@ def _key(run: Path, name: str) -> str:
     for bag in bags_of(run):
         for file in sorted(bag.iterdir()):
             digest.update(f'{bag.name}/{file.name}\n'.encode())
-            try:
+            with refusing('cannot be read', file, 'put it back, or leave out the run'):
                 with file.open('rb') as stream:
                     while piece := stream.read(_PIECE):
                         digest.update(piece)
-            except OSError as error:
-                raise InputError(f'cannot be read ({error.strerror})', str(file),
-                                 'put it back, or leave out the run') from error
     return digest.hexdigest()[:32]

@@ -12,7 +12,7 @@ from crgame_ros.analysis.tables.column import Column, INTEGER, TableDeclaration,
 from crgame_ros.analysis.tables.data_package import data_package, Parent, WrittenTable
 from crgame_ros.analysis.tables.run_tables import TABLES
 from crgame_ros.analysis.tables.writer import Format, NOT_A_NUMBER, TableWriter
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 from crgame_ros.recording.export import prepare_folder
 from crgame_ros.recording.run_folder import PACKAGE_FILE
 from crgame_ros.study.analysis.r_script import r_script
@@ -54,13 +54,10 @@ def write_run_tables(trials: Sequence[CountedTrial], out: Path, study: str) -> d
     written = []
     for declaration in DECLARATIONS:
         path = out / f'{declaration.name}.parquet'
-        try:
+        with refusing('cannot be written', path, 'make room, or make the folder writable'):
             with whole_file(path) as part, TableWriter(declaration, part, 'parquet') as writer:
                 for trial in measured:
                     _add(trial, declaration.name, writer)
-        except OSError as error:
-            raise InputError(f'cannot be written ({error.strerror})', str(path),
-                             'make room, or make the folder writable') from error
         written.append(WrittenTable(declaration, path, path.name, writer.rows))
     package = data_package(written, 'parquet', f'{study}-runs') | {
         'title': f'Runs of the study {study}', MADE_OF: made_of}
