@@ -46,7 +46,7 @@ class Things:
 
     @cached_property
     def radii(self) -> Array:
-        """Return the radii (N) of their circles [m]."""
+        """Return the radius of each one's circle (N) [m]."""
         return np.array([item.shape.radius for item in self.descriptions])
 
 

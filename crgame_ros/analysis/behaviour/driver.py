@@ -40,6 +40,7 @@ from crgame_ros.analysis.behaviour.reactions import (
     USUAL_LIMITS,
 )
 from crgame_ros.analysis.behaviour.task_events import DetectionScore
+from crgame_ros.finite_json import finite
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.events import FiredEvent, SpeedLimit
 from crgame_ros.geometry.outline import outline, placed
@@ -62,6 +63,13 @@ class EventReaction:
     event_s: float
     reaction: Reaction
 
+    def values(self) -> dict[str, object]:
+        """Return its values by the names of tables and JSON; NaN where there is none."""
+        return {'event': self.event, 'time_s': self.event_s,
+                'reaction_throttle': self.reaction.throttle_s,
+                'reaction_brake': self.reaction.brake_s,
+                'reaction_steering': self.reaction.steering_s}
+
 
 @dataclass(frozen=True)
 class LaneChangeGap:
@@ -80,6 +88,15 @@ class LaneChangeGap:
     gap: AcceptedGap
     leader: str | None
     follower: str | None
+
+    def values(self) -> dict[str, object]:
+        """Return its values by the names of tables and JSON; NaN or None where there is none."""
+        found: dict[str, object] = {'time_s': self.time_s, 'side': self.side}
+        for who, name, gap in (('leader', self.leader, self.gap.leader),
+                               ('follower', self.follower, self.gap.follower)):
+            found |= {who: name, f'gap_to_{who}': None if gap is None else gap.gap,
+                      f'gap_accepted_{who}': None if gap is None else gap.time_gap_s}
+        return found
 
 
 @dataclass(frozen=True)
@@ -113,56 +130,16 @@ class DriverBehaviour:
     tlc_s: FloatArray
     tlc_linear_s: FloatArray
 
-    def as_dict(self, series: bool = False) -> dict[str, object]:
-        """
-        Return the fields as a JSON-compatible dictionary; None where a value is not finite.
-
-        :param series: whether to include the time series.
-        """
-        found: dict[str, object] = {
+    def as_dict(self) -> dict[str, object]:
+        """Return the fields as a JSON-compatible dictionary; None where a value is not finite."""
+        return {
             'human': self.human, 'driven_s': self.driven_s,
-            'measures': {name: {'value': _finite(value), 'unit': MEASURES[name].unit}
+            'measures': {name: {'value': finite(value), 'unit': MEASURES[name].unit}
                          for name, value in self.values.items()},
-            'reactions': [{
-                'event': each.event, 'time_s': each.event_s,
-                'reaction_throttle': _finite(each.reaction.throttle_s),
-                'reaction_brake': _finite(each.reaction.brake_s),
-                'reaction_steering': _finite(each.reaction.steering_s)}
-                for each in self.reactions],
+            'reactions': [finite(each.values()) for each in self.reactions],
             'response_limits': self.limits._asdict(),
-            'lane_changes': [_lane_change_values(each) for each in self.lane_changes],
-            'take_overs': [_take_over_values(each) for each in self.take_overs]}
-        if series:
-            found['series'] = {'time_s': self.times_s.tolist(),
-                               'tlc': list(map(_finite, self.tlc_s.tolist())),
-                               'tlc_linear': list(map(_finite, self.tlc_linear_s.tolist()))}
-        return found
-
-
-def _lane_change_values(change: LaneChangeGap) -> dict[str, object]:
-    found: dict[str, object] = {'time_s': _finite(change.time_s), 'side': change.side}
-    for name in ('leader', 'follower'):
-        neighbour: Neighbour | None = getattr(change.gap, name)
-        found |= {name: getattr(change, name),
-                  f'gap_to_{name}': None if neighbour is None else neighbour.gap,
-                  f'gap_accepted_{name}':
-                  None if neighbour is None else _finite(neighbour.time_gap_s)}
-    return found
-
-
-def _take_over_values(take_over: TakeOver) -> dict[str, object]:
-    request = take_over.request
-    return {'request': None if request is None else request.by,
-            'request_s': None if request is None else request.time_s,
-            'seat_s': take_over.seat_s, 'end_s': take_over.end_s,
-            'hands_on_s': _finite(take_over.hands_on_s),
-            'stable_s': _finite(take_over.stable_s),
-            'take_over_hands_on': _finite(take_over.to_hands_on_s),
-            'take_over_stable': _finite(take_over.to_stable_s)}
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+            'lane_changes': [finite(each.values()) for each in self.lane_changes],
+            'take_overs': [finite(each.values()) for each in self.take_overs]}
 
 
 def limits_of(roads: RoadNetwork, visits: Sequence[LaneVisit], count: int,

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The measures of driving by their names: unit, definition, variant, reference point."""
 
-import math
 from typing import NamedTuple
 
 from crgame_ros.analysis.behaviour.driver_controls import (
@@ -42,7 +41,6 @@ class BehaviourMeasure(NamedTuple):
     :param variant: the variant among those in the literature, with its thresholds.
     :param reference: the point or the signal that it is measured at.
     :param per: what one value is for: vehicle, event, lane change, take-over or step.
-    :param undefined: the value where there is nothing to measure.
     """
 
     unit: str
@@ -50,7 +48,6 @@ class BehaviourMeasure(NamedTuple):
     variant: str
     reference: str
     per: str = 'vehicle'
-    undefined: float = math.nan
 
 
 def _spread(name: str, unit: str, what: str, variant: str,
@@ -105,26 +102,23 @@ MEASURES = {
     'lane_offset_mean': BehaviourMeasure(
         'm', "mean offset to the left of the lane's centre line", 'the samples of sdlp', 'center'),
     'lane_changes': BehaviourMeasure(
-        '1', 'changes to a neighbouring lane', 'completed: the centre is across', 'center',
-        undefined=0.0),
+        '1', 'changes to a neighbouring lane', 'completed: the centre is across', 'center'),
     'srr_visual': _reversals(VISUAL, 'visual'),
     'srr_cognitive': _reversals(COGNITIVE, 'cognitive'),
     'tlc_min': BehaviourMeasure(
         's', 'smallest time to lane crossing of the first wheel',
-        f'speed and yaw rate held; up to {HORIZON_S:g} s, lane changes cut out', _WHEELS,
-        undefined=math.inf),
+        f'speed and yaw rate held; up to {HORIZON_S:g} s, lane changes cut out', _WHEELS),
     'tlc_linear_min': BehaviourMeasure(
         's', 'smallest linear time to lane crossing',
         f'distance to the boundary over the speed towards it; up to {HORIZON_S:g} s, lane changes '
-        'cut out', _WHEELS, undefined=math.inf),
+        'cut out', _WHEELS),
     **_pedal('throttle'), **_pedal('brake'),
     'tlc': BehaviourMeasure(
         's', 'time to lane crossing of the first wheel',
-        f'speed and yaw rate held; up to {HORIZON_S:g} s, 0 with a wheel across', _WHEELS, 'step',
-        math.inf),
+        f'speed and yaw rate held; up to {HORIZON_S:g} s, 0 with a wheel across', _WHEELS, 'step'),
     'tlc_linear': BehaviourMeasure(
         's', 'distance to the boundary over the speed towards it, of the first wheel',
-        f'up to {HORIZON_S:g} s, 0 with a wheel across', _WHEELS, 'step', math.inf),
+        f'up to {HORIZON_S:g} s, 0 with a wheel across', _WHEELS, 'step'),
     'reaction_throttle': BehaviourMeasure(
         's', 'time from the event until the throttle is released',
         f'by {USUAL_LIMITS.throttle_release:g} of its travel; {_EVENT}', 'throttle', 'event'),

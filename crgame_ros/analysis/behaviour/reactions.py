@@ -131,6 +131,15 @@ class TakeOver(NamedTuple):
         """Return the time from request to first stable second; NaN if one is missing [s]."""
         return math.nan if self.request is None else self.stable_s - self.request.time_s
 
+    def values(self) -> dict[str, object]:
+        """Return its values by the names of tables and JSON; NaN or None where there is none."""
+        return {'request': None if self.request is None else self.request.by,
+                'request_s': None if self.request is None else self.request.time_s,
+                'seat_s': self.seat_s, 'end_s': self.end_s,
+                'hands_on_s': self.hands_on_s, 'stable_s': self.stable_s,
+                'take_over_hands_on': self.to_hands_on_s,
+                'take_over_stable': self.to_stable_s}
+
 
 def find_take_overs(controls: DriverControls, calm: NDArray[np.bool_],
                     requests: Sequence[TakeOverRequest]) -> tuple[TakeOver, ...]:

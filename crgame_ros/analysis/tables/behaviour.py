@@ -2,17 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables of driving behaviour: for each vehicle, event, lane change and take-over."""
 
-from collections.abc import Iterable, Mapping, Sequence
-import math
+from collections.abc import Iterator, Mapping
 
-from crgame_ros.analysis.behaviour.gaps_accepted import Neighbour
 from crgame_ros.analysis.behaviour.measures import MEASURES
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
     Column,
     INTEGER,
-    known,
     NUMBER,
+    Row,
     RUN,
     TableDeclaration,
     TablePart,
@@ -32,11 +30,10 @@ def _column(name: str, empty: str) -> Column:
                   measure.variant, empty)
 
 
-def _vehicles(run: Run) -> Mapping[str, Sequence[object]]:
-    found = run.usual_behaviour
-    return {'driven_s': [each.driven_s for each in found],
-            **{f'drive_{name}': [known(each.values.get(name, math.nan)) for each in found]
-               for name in _PER_VEHICLE}}
+def _vehicles(run: Run) -> Iterator[Row]:
+    for each in run.usual_behaviour:
+        yield {'driven_s': each.driven_s,
+               **{f'drive_{name}': each.values.get(name) for name in _PER_VEHICLE}}
 
 
 VEHICLE_BEHAVIOUR = TablePart((
@@ -81,45 +78,10 @@ BEHAVIOUR_TABLES = REACTIONS, LANE_CHANGES, TAKE_OVERS
 
 def write_behaviour(run: Run, writers: Mapping[str, TableRows]) -> None:
     """Add the rows of a run to the tables of reactions, lane changes and take-overs."""
-    for table, rows in ((REACTIONS, _reactions(run)), (LANE_CHANGES, _lane_changes(run)),
-                        (TAKE_OVERS, _take_over_rows(run))):
-        found = list(rows)
-        if found:
-            writers[table.name].add({column.name: [row[column.name] for row in found]
-                                     for column in table.columns})
-
-
-def _reactions(run: Run) -> Iterable[Mapping[str, object]]:
     for driver in run.usual_behaviour:
-        for each in driver.reactions:
-            yield {'run': run.id, 'vehicle': driver.vehicle_id, 'event': each.event,
-                   'time_s': each.event_s,
-                   'reaction_throttle': known(each.reaction.throttle_s),
-                   'reaction_brake': known(each.reaction.brake_s),
-                   'reaction_steering': known(each.reaction.steering_s)}
-
-
-def _lane_changes(run: Run) -> Iterable[Mapping[str, object]]:
-    for driver in run.usual_behaviour:
-        for number, change in enumerate(driver.lane_changes):
-            yield {'run': run.id, 'vehicle': driver.vehicle_id, 'number': number,
-                   'time_s': known(change.time_s), 'side': change.side,
-                   **_neighbour('leader', change.leader, change.gap.leader),
-                   **_neighbour('follower', change.follower, change.gap.follower)}
-
-
-def _neighbour(who: str, name: str | None, gap: Neighbour | None) -> dict[str, object]:
-    return {who: name, f'gap_to_{who}': None if gap is None else gap.gap,
-            f'gap_accepted_{who}': None if gap is None else gap.time_gap_s}
-
-
-def _take_over_rows(run: Run) -> Iterable[Mapping[str, object]]:
-    for driver in run.usual_behaviour:
-        for each in driver.take_overs:
-            yield {'run': run.id, 'vehicle': driver.vehicle_id, 'seat_s': each.seat_s,
-                   'end_s': each.end_s,
-                   'request': None if each.request is None else each.request.by,
-                   'request_s': None if each.request is None else each.request.time_s,
-                   'hands_on_s': known(each.hands_on_s), 'stable_s': known(each.stable_s),
-                   'take_over_hands_on': known(each.to_hands_on_s),
-                   'take_over_stable': known(each.to_stable_s)}
+        of = {'run': run.id, 'vehicle': driver.vehicle_id}
+        writers[REACTIONS.name].add_rows(of | each.values() for each in driver.reactions)
+        writers[LANE_CHANGES.name].add_rows(
+            of | {'number': number} | each.values()
+            for number, each in enumerate(driver.lane_changes))
+        writers[TAKE_OVERS.name].add_rows(of | each.values() for each in driver.take_overs)

@@ -5,7 +5,6 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import json
-import math
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -102,9 +101,7 @@ def step_columns(of: str) -> tuple[Column, Column]:
                    variant='simulated time, (k - k0) times the scenario time step'))
 
 
-def known(value: float) -> float | None:
-    """Return a value of a row; None, which is missing, for NaN."""
-    return None if math.isnan(value) else value
+Row = Mapping[str, object]
 
 
 @dataclass(frozen=True)
@@ -113,12 +110,12 @@ class TablePart:
     Some columns of a table whose parts share the same rows: `vehicles`, `events`, `runs`.
 
     :param columns: the columns that it fills.
-    :param values: returns the values of a run by column, in the order of the table's rows;
-        columns that it leaves out stay empty.
+    :param rows: yields the values of a run by column, one mapping for each of the table's rows in
+        their order; columns that are left out stay empty.
     """
 
     columns: tuple[Column, ...]
-    values: 'Callable[[Run], Mapping[str, Sequence[object]]]'
+    rows: 'Callable[[Run], Iterable[Row]]'
 
 
 def declare(name: str, row: str, key: tuple[str, ...],
@@ -127,20 +124,17 @@ def declare(name: str, row: str, key: tuple[str, ...],
     return TableDeclaration(name, row, key, (column for part in parts for column in part.columns))
 
 
-def part_rows(parts: Sequence[TablePart], run: 'Run') -> dict[str, Sequence[object]]:
+def part_rows(parts: Sequence[TablePart], run: 'Run') -> list[dict[str, object]]:
     """
-    Return all columns of a run's rows.
+    Return a run's rows, with the columns of all parts.
 
-    :raises ValueError: if a part has other rows than the first, or a column of another part.
+    :raises ValueError: if parts have different numbers of rows, or a column of another part.
     """
-    found: dict[str, Sequence[object]] = {}
-    for part in parts:
-        values = part.values(run)
-        names = {column.name for column in part.columns}
-        if not values.keys() <= names or values.keys() & found.keys():
-            raise ValueError(f'columns that are not of this part: {sorted(values.keys() - names)}')
-        found.update(values)
-    lengths = {len(values) for values in found.values()}
-    if len(lengths) > 1:
-        raise ValueError(f'parts disagree about the rows: {sorted(lengths)}')
+    found: list[dict[str, object]] = []
+    for rows in zip(*(part.rows(run) for part in parts), strict=True):
+        found.append({})
+        for part, row in zip(parts, rows, strict=True):
+            if strange := row.keys() - {column.name for column in part.columns}:
+                raise ValueError(f'columns that are not of this part: {sorted(strange)}')
+            found[-1].update(row)
     return found

@@ -24,7 +24,6 @@ from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
     Column,
     INTEGER,
-    known,
     NUMBER,
     RUN,
     TableDeclaration,
@@ -166,7 +165,7 @@ def _add_channels(run: Run, recorded: RecordedStream, channels: list[str],
         'run': run.id, 'stream': recorded.id, 'channel': channels, 'unit': list(stream.units),
         'type': stream.type, 'source_id': stream.source_id, 'host': stream.host,
         'rate': stream.rate_hz or None, 'samples': len(recorded.sent_s), 'gaps': stream.gaps,
-        'clock_drift': known(recorded.drift)})
+        'clock_drift': recorded.drift})
 
 
 def _add_samples(run: Run, recorded: RecordedStream, channels: list[str],

@@ -11,6 +11,7 @@ from crgame_ros.analysis.tables.column import (
     FLAG,
     INTEGER,
     NUMBER,
+    Row,
     RUN,
     step_columns,
     TableDeclaration,
@@ -25,7 +26,6 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-_ROWS = 4096
 REAR_AXLE = 'rear axle'
 NO_PLAN = 'the answer was not a plan'
 STATE_COLUMNS = (
@@ -65,28 +65,17 @@ PLANS = TableDeclaration(
           for name, when, _ in DEVIATIONS)))
 
 
-def plan_rows(run: Run) -> Iterator[dict[str, object]]:
+def plan_rows(run: Run) -> Iterator[Row]:
     """
-    Yield the rows of a run, in pieces, and count the plans of each AV.
+    Yield the rows of a run, and count the plans of each AV.
 
     :raises InputError: if the recording is damaged.
     """
     avs = {av.id: av for av in run.game.avs}
     plans = run.plans
     run.tallies = {av: PlanTally() for av in avs} if plans is not None else {}
-    rows: list[dict[str, object]] = []
     for plan in plans() if plans is not None else ():
-        rows.append(_row(run, plan, avs[plan.av], run.tallies[plan.av]))
-        if len(rows) == _ROWS:
-            yield _columns(run, rows)
-            rows = []
-    if rows:
-        yield _columns(run, rows)
-
-
-def _columns(run: Run, rows: list[dict[str, object]]) -> dict[str, object]:
-    return {'run': run.id, **{name: [row.get(name) for row in rows]
-                              for name in PLANS.schema.names if name != 'run'}}
+        yield {'run': run.id, **_row(run, plan, avs[plan.av], run.tallies[plan.av])}
 
 
 def _row(run: Run, found: RecordedPlan, av: DrivenAv, tally: PlanTally) -> dict[str, object]:

@@ -227,13 +227,11 @@ def _add_rows(run: Run, writers: Mapping[str, TableRows]) -> None:
     for rows in state_rows(run):
         writers[STATES.name].add(rows)
     write_criticality(run, writers[PAIRS.name], writers[CROSSINGS.name])
-    for rows in plan_rows(run):
-        writers[PLANS.name].add(rows)
+    writers[PLANS.name].add_rows(plan_rows(run))
     run.telling('measuring how people drove in')(0.0)
     write_behaviour(run, writers)
     write_tasks(run, writers)
     write_instruments(run, writers)
     write_gaze(run, writers)
     for table, parts in ((EVENTS, EVENT_PARTS), (VEHICLES, VEHICLE_PARTS), (RUNS, RUN_PARTS)):
-        if (values := part_rows(parts, run))['run']:
-            writers[table.name].add(values)
+        writers[table.name].add_rows(part_rows(parts, run))

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of runs: the settings of each run, its timing, and its problems."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 import hashlib
 import json
 from typing import Any
@@ -13,6 +13,7 @@ from crgame_ros.analysis.tables.column import (
     declare,
     INTEGER,
     NUMBER,
+    Row,
     RUN,
     TablePart,
     TEXT,
@@ -43,37 +44,37 @@ COUNTS = {'cycles': 'cycles that were recorded', 'gaps': 'cycles that were lost'
           'resets': 'drift resets', 'catch_up_steps': 'cycles more than a step late'}
 
 
-def _identity(run: Run) -> Mapping[str, Sequence[object]]:
+def _identity(run: Run) -> Iterator[Row]:
     log = run.log
     game, scheduler = log.game, log.game.scheduler
     planners = {av.id: av.planner for av in game.avs}
     refusal = run.usual_scores.refusal
     remarks = (f'no scores: {refusal}',) if refusal else ()
     file = hashlib.sha256(game.file.encode('utf-8', 'replace')).hexdigest() if game.file else None
-    return {
-        'run': [run.id], 'benchmark_id': [game.benchmark_id], 'title': [game.title],
-        'epoch': [game.epoch], 'scenario_sha256': [game.scenario_sha256], 'game_sha256': [file],
-        'seed': [game.seed if abs(game.seed) < 2**63 else None],
-        'time_step_s': [scheduler.time_step_s], 'dt_s': [scheduler.dt_s],
-        'k0': [scheduler.k0], 'first_k': [int(log.ks[0])], 'last_k': [int(log.ks[-1])],
-        'duration_s': [int(log.ks[-1] - log.ks[0]) * scheduler.time_step_s],
-        'real_time_factor': [game.real_time_factor], 'humans': [len(game.humans)],
-        'avs': [len(game.avs)], 'objects': [len(log.objects)],
-        'agents': [sum(item.role is Role.TRAFFIC for item in log.objects)],
-        'planners': [json.dumps(planners)], 'events': [len(run.record.fired)],
-        'notices': ['\n'.join((*run.missing, *remarks))]}
+    yield {
+        'run': run.id, 'benchmark_id': game.benchmark_id, 'title': game.title,
+        'epoch': game.epoch, 'scenario_sha256': game.scenario_sha256, 'game_sha256': file,
+        'seed': game.seed if abs(game.seed) < 2**63 else None,
+        'time_step_s': scheduler.time_step_s, 'dt_s': scheduler.dt_s,
+        'k0': scheduler.k0, 'first_k': int(log.ks[0]), 'last_k': int(log.ks[-1]),
+        'duration_s': int(log.ks[-1] - log.ks[0]) * scheduler.time_step_s,
+        'real_time_factor': game.real_time_factor, 'humans': len(game.humans),
+        'avs': len(game.avs), 'objects': len(log.objects),
+        'agents': sum(item.role is Role.TRAFFIC for item in log.objects),
+        'planners': json.dumps(planners), 'events': len(run.record.fired),
+        'notices': '\n'.join((*run.missing, *remarks))}
 
 
-def _timing(run: Run) -> Mapping[str, Sequence[object]]:
+def _timing(run: Run) -> Iterator[Row]:
     timing: Mapping[str, Any] | None = run.timing
-    found: dict[str, Sequence[object]] = {} if timing is None else {
-        **{name: [timing[key] * factor] for key, (name, _, factor, _) in TIMING.items()},
-        **{f'real_time_ratio_{key}': [timing['real_time_ratio'][key]] for key in RATIOS},
-        **{key: [timing[key]] for key in COUNTS}}
+    found: dict[str, object] = {} if timing is None else {
+        **{name: timing[key] * factor for key, (name, _, factor, _) in TIMING.items()},
+        **{f'real_time_ratio_{key}': timing['real_time_ratio'][key] for key in RATIOS},
+        **{key: timing[key] for key in COUNTS}}
     if run.outcome is not None:
-        found['violations'] = [run.outcome['drivability']['violations']]
-        found['contacts'] = [None if run.contacts is None else len(run.contacts)]
-    return found
+        found['violations'] = run.outcome['drivability']['violations']
+        found['contacts'] = None if run.contacts is None else len(run.contacts)
+    yield found
 
 
 RUN_PARTS = (

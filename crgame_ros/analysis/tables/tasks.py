@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables of tasks: stimuli and answers, scores, take-over requests, and spans."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 
 from crgame_ros.analysis.behaviour.task_events import detection_scores, task_events, TaskEvent
 from crgame_ros.analysis.runs.run import Run
@@ -10,8 +10,8 @@ from crgame_ros.analysis.tables.column import (
     Column,
     declare,
     INTEGER,
-    known,
     NUMBER,
+    Row,
     RUN,
     step_columns,
     TableDeclaration,
@@ -24,19 +24,15 @@ from crgame_ros.game.events import ACTIONS
 UNKNOWN = 'the game does not know the event: a vehicle touched another object, or was put back'
 
 
-def _fired(run: Run) -> Mapping[str, Sequence[object]]:
+def _fired(run: Run) -> Iterator[Row]:
     game = run.game
     specs = {spec.name: spec for spec in game.events}
-    fired = run.record.fired
-    known = [specs.get(event.name) for event in fired]
-    return {
-        'run': [run.id] * len(fired), 'k': [event.k for event in fired],
-        'time_s': [event.n * game.scheduler.dt_s for event in fired],
-        'name': [event.name for event in fired],
-        'kind': [None if spec is None else spec.kind for spec in known],
-        'label': [None if spec is None else spec.label for spec in known],
-        'by': [event.by for event in fired],
-        'object': [None if spec is None else spec.object_id for spec in known]}
+    for event in run.record.fired:
+        spec = specs.get(event.name)
+        yield {'run': run.id, 'k': event.k, 'time_s': event.n * game.scheduler.dt_s,
+               'name': event.name, 'by': event.by,
+               **({} if spec is None else {'kind': spec.kind, 'label': spec.label,
+                                           'object': spec.object_id})}
 
 
 EVENT_PARTS = (
@@ -129,16 +125,15 @@ def write_tasks(run: Run, writers: Mapping[str, TableRows]) -> None:
             (DETECTION_SCORES, ({**score.as_dict(), 'vehicle': score.seat}
                                 for score in detection_scores(events))),
             (TAKE_OVER_REQUESTS, _requests(events)), (TASK_SPANS, _spans(events))):
-        found = [{'run': run.id, **row} for row in rows]
-        if found:
-            writers[table.name].add({column.name: [row[column.name] for row in found]
-                                     for column in table.columns})
+        writers[table.name].add_rows(
+            {name: value for name, value in {'run': run.id, **row}.items()
+             if name in table.schema.names} for row in rows)
 
 
 def _common(event: TaskEvent) -> dict[str, object]:
     return {'task': event.name, 'vehicle': event.seat, 'number': event.value,
             'time_s': event.onset_s, 'shown_delay_ms': event.times.delay_ms,
-            'shown_time_s': known(event.shown_s), 'shown_error_ms': event.times.clock_error_ms,
+            'shown_time_s': event.shown_s, 'shown_error_ms': event.times.clock_error_ms,
             'picture_ms': event.times.picture_ms, 'outcome': event.outcome}
 
 
@@ -153,8 +148,8 @@ def _requests(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:
     for event in events:
         if event.what == 'request':
             yield {**_common(event), 'duration_s': event.duration_s,
-                   'first_input_s': known(event.response_time_s),
-                   'answered_s': known(event.answered_s)}
+                   'first_input_s': event.response_time_s,
+                   'answered_s': event.answered_s}
 
 
 def _spans(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:

@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of driven vehicles: driver, distance, scores, and worst moments."""
 
-from collections.abc import Iterator, Mapping, Sequence
-import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
-from crgame_ros.analysis.criticality.criticality import EXPOSURES, MEASURES
+from crgame_ros.analysis.criticality.criticality import EXPOSURES, MEASURES, VehicleCriticality
 from crgame_ros.analysis.criticality.headways import LEAST_SPEED, SHORT_S
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES
@@ -19,6 +18,7 @@ from crgame_ros.analysis.tables.column import (
     FLAG,
     INTEGER,
     NUMBER,
+    Row,
     RUN,
     TablePart,
     TEXT,
@@ -47,8 +47,9 @@ COUNTS = {
 NOT_SCORED = 'the run was not scored'
 
 
-def _rules(run: Run) -> Mapping[str, Sequence[object]]:
-    return {name: [each.values[name] for each in run.usual_rules] for name in RULE_MEASURES}
+def _rules(run: Run) -> Iterator[Row]:
+    for each in run.usual_rules:
+        yield {name: each.values[name] for name in RULE_MEASURES}
 
 
 VEHICLE_RULES = TablePart(tuple(
@@ -91,16 +92,14 @@ def _declared(column: _ScoreColumn) -> Column:
         empty=f'{measure.undefined}, or {NOT_SCORED}' if measure.undefined else NOT_SCORED)
 
 
-def _scores(run: Run) -> Mapping[str, Sequence[object]]:
+def _scores(run: Run) -> Iterator[Row]:
     scores = {each.vehicle_id: each for each in run.usual_scores.vehicles}
-    found = [scores.get(name) for name in run.vehicles]
-    values = [{} if each is None else each.values() for each in found]
-    return {
-        **{column.name: [_value(row.get(column.measure), column) for row in values]
-           for column in _COLUMNS},
-        'score_expert': [None if each is None or each.nuplan is None else each.nuplan.expert
-                         for each in found],
-        'score_failed_checks': [_failed(each) for each in found]}
+    for name in run.vehicles:
+        each = scores.get(name)
+        values = {} if each is None else each.values()
+        yield {**{column.name: _value(values.get(column.measure), column) for column in _COLUMNS},
+               'score_expert': None if each is None or each.nuplan is None
+               else each.nuplan.expert, 'score_failed_checks': _failed(each)}
 
 
 def _value(value: float | None, column: _ScoreColumn) -> float | None:
@@ -122,69 +121,64 @@ VEHICLE_SCORES = TablePart((
            variant='docs/scores.md', empty=f'all are passed, or {NOT_SCORED}')), _scores)
 
 
-def _identity(run: Run) -> Mapping[str, Sequence[object]]:
-    vehicles, driven = run.log.vehicles, run.driven
-    return {
-        'run': [run.id] * len(vehicles), 'id': [item.id for item in vehicles],
-        'role': [item.role.value for item in vehicles],
-        'driver': [item.driver if isinstance(item, DrivenHuman) else
-                   item.planner if isinstance(item, DrivenAv) else '' for item in driven],
-        'vehicle_model': [item.vehicle.name for item in driven],
-        'length': [item.shape.length for item in vehicles],
-        'width': [item.shape.width for item in vehicles],
-        'wheelbase': [item.vehicle.wheelbase for item in driven],
-        'rear_to_center': [item.rear_to_center for item in vehicles],
-        'planning_problem': [item.planning_problem if isinstance(item, DrivenAv) else None
-                             for item in driven]}
+def _identity(run: Run) -> Iterator[Row]:
+    for item, driven in zip(run.log.vehicles, run.driven, strict=True):
+        yield {'run': run.id, 'id': item.id, 'role': item.role.value,
+               'driver': driven.driver if isinstance(driven, DrivenHuman) else
+               driven.planner if isinstance(driven, DrivenAv) else None,
+               'vehicle_model': driven.vehicle.name,
+               'length': item.shape.length, 'width': item.shape.width,
+               'wheelbase': driven.vehicle.wheelbase, 'rear_to_center': item.rear_to_center,
+               'planning_problem': driven.planning_problem if isinstance(driven, DrivenAv)
+               else None}
 
 
-def _drive(run: Run) -> Mapping[str, Sequence[object]]:
+def _drive(run: Run) -> Iterator[Row]:
     states = run.log.vehicle_states
     speeds, accelerations = (states[..., column] for column in (
         StateColumn.SPEED, StateColumn.ACCELERATION))
-    return {'distance': run.record.ways(), 'mean_speed': speeds.mean(axis=0),
-            'max_speed': speeds.max(axis=0),
-            'max_acceleration': accelerations.max(axis=0),
-            'min_acceleration': accelerations.min(axis=0)}
+    columns = {'distance': run.record.ways(), 'mean_speed': speeds.mean(axis=0),
+               'max_speed': speeds.max(axis=0), 'max_acceleration': accelerations.max(axis=0),
+               'min_acceleration': accelerations.min(axis=0)}
+    for values in zip(*columns.values(), strict=True):
+        yield dict(zip(columns, values, strict=True))
 
 
-def _criticality(run: Run) -> Mapping[str, Sequence[object]]:
-    found = [run.vehicle_criticality.get(item.id) for item in run.log.vehicles]
-    columns: dict[str, list[object]] = {}
-    for name in MEASURES:
-        worst = [None if each is None else each.worst.get(name) for each in found]
-        columns[f'worst_{name}'] = [None if each is None else each.value for each in worst]
-        columns[f'worst_{name}_of'] = [None if each is None else each.other for each in worst]
-        columns[f'worst_{name}_time_s'] = [None if each is None else each.time_s for each in worst]
-    columns['max_inverse_ttc'] = [
-        None if each is None else 0.0 if (least := each.worst.get('ttc')) is None
-        else 1.0 / max(least.value, LEAST_TTC_S) for each in found]
-    for name in EXPOSURES:
-        columns[name] = [None if each is None else each.exposures[name] for each in found]
-    columns['crossings'] = [None if each is None else len(each.crossings) for each in found]
-    columns['worst_pet_s'] = [None if each is None else min(
-        (crossing.pet_s for crossing in each.crossings), default=None) for each in found]
-    return columns
+def _criticality(run: Run) -> Iterator[Row]:
+    for each in _measured(run):
+        if each is None:
+            yield {}
+            continue
+        least = each.worst.get('ttc')
+        yield {
+            **{f'worst_{name}{end}': value for name, worst in each.worst.items()
+               for end, value in (('', worst.value), ('_of', worst.other),
+                                  ('_time_s', worst.time_s))},
+            'max_inverse_ttc': 0.0 if least is None else 1.0 / max(least.value, LEAST_TTC_S),
+            **{name: each.exposures[name] for name in EXPOSURES},
+            'crossings': len(each.crossings),
+            'worst_pet_s': min((crossing.pet_s for crossing in each.crossings), default=None)}
 
 
-def _following(run: Run) -> Mapping[str, Sequence[object]]:
-    found = [run.vehicle_criticality.get(item.id) for item in run.log.vehicles]
-    columns: dict[str, list[object]] = {column.name: [] for column in FOLLOWING_COLUMNS}
-    for each in found:
-        row: dict[str, float | None] = dict.fromkeys(columns)
+def _following(run: Run) -> Iterator[Row]:
+    for each in _measured(run):
+        row: dict[str, float] = {}
         if each is not None:
-            headways = each.headways
-            row['share_following'] = headways.share_following()
-            row['share_approaching'] = headways.share_approaching()
-            for name, values in headways.distances().items():
+            row['share_following'] = each.headways.share_following()
+            row['share_approaching'] = each.headways.share_approaching()
+            for name, values in each.headways.distances().items():
                 row[f'{name}_mean'], row[f'{name}_median'] = values.mean, values.median
-            for name, values in headways.times().items():
+            for name, values in each.headways.times().items():
                 row[f'{name}_mean_s'], row[f'{name}_median_s'] = values.mean, values.median
                 for limit, share in zip(SHORT_S, values.below, strict=True):
                     row[f'{name}_below_{limit}s'] = share
-        for name, value in row.items():
-            columns[name].append(None if value is None or math.isnan(value) else value)
-    return columns
+        yield row
+
+
+def _measured(run: Run) -> Iterator[VehicleCriticality | None]:
+    """Yield the criticality of each vehicle; None of one without."""
+    for item in run.log.vehicles:
+        yield run.vehicle_criticality.get(item.id)
 
 
 def _following_columns() -> Iterator[Column]:
@@ -225,22 +219,20 @@ def _count_name(key: str) -> str:
     return f'plans_{key}' if key in ('accepted', 'refused', 'of_others', 'realigned') else key
 
 
-def _planning(run: Run) -> Mapping[str, Sequence[object]]:
-    ids = [item.id for item in run.log.vehicles]
-    answers = run.answers
-    tallies = [run.tallies.get(name) for name in ids]
-    latencies = [None if tally is None or not tally.latencies_s else tally.latencies_s
-                 for tally in tallies]
-    return {
-        **{_count_name(key):
-           [getattr(answers.get(name), key, None) for name in ids] for key in COUNTS},
-        'fallbacks': [getattr(answers.get(name), 'fallback', None) for name in ids],
-        'plans': [None if tally is None else tally.answers for tally in tallies],
-        'plans_passing': [None if tally is None or tally.checked < tally.answers
-                          else tally.passing for tally in tallies],
-        'latency_p50_s': [None if each is None else float(np.percentile(each, 50))
-                          for each in latencies],
-        'latency_max_s': [None if each is None else max(each) for each in latencies]}
+def _planning(run: Run) -> Iterator[Row]:
+    for item in run.log.vehicles:
+        answers, tally = run.answers.get(item.id), run.tallies.get(item.id)
+        row: dict[str, object] = {} if answers is None else {
+            'fallbacks': answers.fallback,
+            **{_count_name(key): getattr(answers, key) for key in COUNTS}}
+        if tally is not None:
+            row['plans'] = tally.answers
+            if tally.checked >= tally.answers:
+                row['plans_passing'] = tally.passing
+            if tally.latencies_s:
+                row['latency_p50_s'] = float(np.percentile(tally.latencies_s, 50))
+                row['latency_max_s'] = max(tally.latencies_s)
+        yield row
 
 
 FOLLOWING_COLUMNS = tuple(_following_columns())

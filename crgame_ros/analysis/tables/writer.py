@@ -3,16 +3,20 @@
 """Writes one table's file in pieces, so that memory does not grow with the run's length."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 import csv
+from itertools import islice
 import math
 from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self, TypeGuard
 
-from crgame_ros.analysis.tables.column import FLAG, NUMBER, TableDeclaration, TEXT
+from crgame_ros.analysis.tables.column import FLAG, NUMBER, Row, TableDeclaration, TEXT
 import pyarrow as pa
 import pyarrow.parquet as pq
+
+# Number of rows that are added together.
+_ADDED_ROWS = 1024
 
 
 class TableRows(ABC):
@@ -48,6 +52,17 @@ class TableRows(ABC):
             [_array(columns.get(column.name), column.type, rows)
              for column in self.declaration.columns], schema=self.declaration.schema))
 
+    def add_rows(self, rows: Iterable[Row]) -> None:
+        """
+        Add rows, each with its values by column; columns that are not named stay empty.
+
+        :raises KeyError: if a column is not declared.
+        """
+        left = iter(rows)
+        while piece := list(islice(left, _ADDED_ROWS)):
+            names = dict.fromkeys(name for row in piece for name in row)
+            self.add({name: [row.get(name) for row in piece] for name in names})
+
     @abstractmethod
     def add_batch(self, batch: pa.RecordBatch) -> None:
         """Add rows in the table's own types."""
@@ -81,7 +96,8 @@ def _array(values: object, kind: pa.DataType, rows: int) -> pa.Array:
     if isinstance(values, pa.Array):
         return values
     if not _are_many(values):
-        return pa.repeat(pa.scalar(None if values == '' else _plain_text(values), kind), rows)
+        is_missing = values == '' or values != values
+        return pa.repeat(pa.scalar(None if is_missing else _plain_text(values), kind), rows)
     if kind == TEXT:
         values = [_plain_text(text) if text else None for text in values]
     return pa.array(values, kind, from_pandas=True)
@@ -179,7 +195,7 @@ def spelled(column: pa.Array | pa.ChunkedArray, is_guarded: bool = True) -> list
 
     :param is_guarded: whether text that looks like a formula gets a prefix.
     """
-    values: list[object] = column.to_pylist()
+    values = column.to_pylist()
     if column.type == NUMBER:
         # Full precision, always with a point or an exponent, so that none looks like an integer.
         return [NOT_A_NUMBER if value is None

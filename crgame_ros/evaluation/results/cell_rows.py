@@ -103,11 +103,10 @@ def vehicle_rows(run: Run, result: OfflineResult,
 
     :param contacts: of the run.
     """
-    columns: dict[str, Sequence[object]] = part_rows(VEHICLE_PARTS, run)
-    ids = columns.pop('id')
-    del columns['run']
     rows = []
-    for place, vehicle in enumerate(map(str, ids)):
+    for row in part_rows(VEHICLE_PARTS, run):
+        del row['run']
+        vehicle = str(row.pop('id'))
         verdicts = [item for item in result.violations if item.vehicle_id == vehicle]
         record = result.planners.get(vehicle)
         collided = any(item.collision for item in verdicts)
@@ -118,10 +117,11 @@ def vehicle_rows(run: Run, result: OfflineResult,
             if collided and record is not None else None,
             'left_road': any(item.off_road for item in verdicts),
             'accepted_ratio': None if record is None else record.accepted_ratio,
-            **{name: _plain(values[place]) for name, values in columns.items()}})
+            **{name: _plain(value) for name, value in row.items()}})
     return rows
 
 
 def _plain(value: object) -> object:
-    """Return a value as a JSON-compatible one."""
-    return value.item() if hasattr(value, 'item') else value
+    """Return a value as a JSON-compatible one; None, which is missing, for NaN."""
+    plain: object = value.item() if hasattr(value, 'item') else value
+    return None if plain != plain else plain

@@ -311,11 +311,8 @@ def _journal_lines(path: Path) -> list[CellRows]:
 def _write_rows(table: TableDeclaration, cells: Sequence[CellRows],
                 sink: Path | pa.NativeFile) -> None:
     """Write the rows of cells in a table."""
-    rows = [row for each in cells for row in _rows_of(table, each)]
     with TableWriter(table, sink, 'parquet') as writer:
-        if rows:
-            writer.add({column.name: [row.get(column.name) for row in rows]
-                        for column in table.columns})
+        writer.add_rows(row for each in cells for row in _rows_of(table, each))
 
 
 def _rows_of(table: TableDeclaration, cell: CellRows) -> list[dict[str, object]]:

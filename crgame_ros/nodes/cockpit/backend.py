@@ -203,8 +203,8 @@ class LiveBackend:
             stage, rights = client.view.stage, client.rights
             if stage and rights.drives and rights.seat in ('', stage):
                 riders.setdefault(stage, client)
-        return riders | {seat: clients[each.holder] for seat, each in held.items()
-                        if each.holder in clients}
+        return riders | {
+            seat: clients[each.holder] for seat, each in held.items() if each.holder in clients}
 
     def _seat_who_chose(self) -> None:
         """Seat the client that uploaded the game, now that it has begun."""
