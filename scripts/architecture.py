@@ -13,6 +13,7 @@ the sentence beside each folder is its own docstring.
 
 import ast
 from collections import Counter
+from functools import cache
 from pathlib import Path
 import sys
 
@@ -72,15 +73,21 @@ def imports() -> dict[tuple[str, str], list[str]]:
 
 def imported_by(path: Path, known: dict[str, Path]) -> set[str]:
     """Return the modules of the package that a file imports, within functions as well."""
-    found = set()
+    # A name may be a module of the folder.
+    return {name if (name := f'{module}.{item}') in known else module
+            for module, item in imported_names(path)} & set(known)
+
+
+@cache
+def imported_names(path: Path) -> frozenset[tuple[str, str]]:
+    """Return what a file imports: modules, each with a name from it, or with an empty one."""
+    found: set[tuple[str, str]] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
         if isinstance(node, ast.Import):
-            found |= {item.name for item in node.names}
+            found |= {(item.name, '') for item in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
-            # A name may be a module of the folder.
-            found |= {name if (name := f'{node.module}.{item.name}') in known else node.module
-                      for item in node.names}
-    return found & set(known)
+            found |= {(node.module, item.name) for item in node.names}
+    return frozenset(found)
 
 
 def sentence(folder: str) -> str:

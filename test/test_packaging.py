@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The installed files and their places, the pins, and scripts/env.sh."""
 
-import ast
 from collections.abc import Iterator
 from configparser import ConfigParser
 import hashlib
@@ -27,15 +26,19 @@ from packaging.utils import canonicalize_name
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / 'scripts'))
+
+from architecture import imported_names  # noqa: E402, I100
+
 NODES = ('sim_node', 'driver_node', 'planner_node', 'drivability_node', 'criticality_node',
          'timesync_node', 'recorder_node', 'marker_node', 'cockpit_node',
          'perception_node', 'traffic_node', 'map_node', 'instruments_node')
 DATA = ('launch', 'config', 'examples', 'scenarios', 'msg_defs', 'page')
 PINS = ('requirements.txt', 'requirements-planners.txt')
-# Modules of ROS packages whose name is no ROS package's.
 # Without uv, wherever this machine has it.
 WITHOUT_UV = os.pathsep.join(folder for folder in os.environ['PATH'].split(os.pathsep)
                              if not (Path(folder) / 'uv').exists())
+# Modules of ROS packages whose name is no ROS package's.
 MESSAGE_PACKAGE = re.compile(r'\w+_msgs|std_srvs|builtin_interfaces|rcl_interfaces|rclpy')
 
 
@@ -234,10 +237,7 @@ def test_manifest_names_what_the_package_imports() -> None:
     assert manifest.findtext('export/build_type') == 'ament_python'
     imported = set()
     for file in (ROOT / 'crgame_ros').rglob('*.py'):
-        for node in ast.walk(ast.parse(file.read_text(encoding='utf-8'))):
-            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else (
-                [node.module or ''] if isinstance(node, ast.ImportFrom) else [])
-            imported |= {name.partition('.')[0] for name in names}
+        imported |= {name.partition('.')[0] for name, _ in imported_names(file)}
     ros = {name for name in imported if MESSAGE_PACKAGE.fullmatch(name)}
     declared = {element.text for element in manifest.iter('exec_depend')}
     assert ros <= declared, ros - declared

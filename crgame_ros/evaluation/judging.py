@@ -84,18 +84,23 @@ def value_of(measure: str, row: Row) -> float | None:
 
     :param row: of the table `vehicles` of an evaluation.
     """
-    measure = _full_name(measure)
+    values = [_number(row.get(name)) for name in columns_of(measure)]
     if measure == GOAL_REACHED_S:
         # Never reached is later than any time.
-        reached = _number(row.get('score_reached_s'))
-        return math.inf if math.isnan(reached) else reached
-    summary = MEASURES.get(measure)
-    if summary is None or not summary.column:
-        value = _number(row.get(measure))
-    else:
-        value = float(summary.values(*(np.array([_number(row.get(name))])
-                                       for name in summary.columns))[0])
+        return math.inf if math.isnan(values[0]) else values[0]
+    summary = MEASURES.get(_full_name(measure))
+    value = values[0] if summary is None or not summary.column else float(
+        summary.values(*map(np.atleast_1d, values))[0])
     return None if math.isnan(value) else value
+
+
+def columns_of(measure: str) -> tuple[str, ...]:
+    """Return the columns of a vehicle's row from which a measure is computed."""
+    if measure == GOAL_REACHED_S:
+        return ('score_reached_s',)
+    name = _full_name(measure)
+    summary = MEASURES.get(name)
+    return (name,) if summary is None or not summary.column else summary.columns
 
 
 def worst_of(measure: str, rows: Sequence[Row], sign: int) -> float | None:

@@ -8,7 +8,7 @@ import time
 
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.errors import CrgameError
-from crgame_ros.evaluation.judging import check_expectations, shortfalls
+from crgame_ros.evaluation.judging import check_expectations, columns_of, shortfalls
 from crgame_ros.evaluation.results.cell_rows import vehicle_rows
 from crgame_ros.game.expectation import Expectation
 from crgame_ros.game.game import Game, load_game
@@ -35,7 +35,8 @@ def run_case(case: Case, out: Path) -> CaseResult:
         game = _adapted(game, case)
         result = run_offline(build_setup(game), keep_messages=True)
         run = Run(case.name, result=result, scoring='drives')
-        rows = vehicle_rows(run, result, contacts_of(result))
+        rows = vehicle_rows(run, result, contacts_of(result), [
+            column for each in expectations for column in columns_of(each.measure)])
         broken = tuple(tuple(shortfalls(each, rows)) for each in expectations)
         folder = None
         if any(broken):

@@ -134,7 +134,8 @@ class Peer:
         """Step of the present epoch by /clock; negative before its first."""
         if not self.messages['/clock'] or not self.messages['/scenario/game']:
             return -1
-        return self.games[-1].scheduler.step_of_stamp(self.clock_ns[-1])
+        game = _parsed(self.messages['/scenario/game'][-1].data)
+        return game.scheduler.step_of_stamp(from_time(self.messages['/clock'][-1].clock))
 
     def cycles(self, epoch: int | None = None) -> CycleTable:
         """Join the cycles of an epoch, the latest by default."""

@@ -93,7 +93,7 @@ class Sender:
         """Send a message again and again, until a node tells of its refusal."""
         def is_refused() -> bool:
             self.send(topic, '', message)
-            self._peer.listen_for(3.0)
+            self._peer.listen_for(1.0)
             return any(reason in status.message
                        for status, _ in self._peer.statuses(f'{node}: messages refused'))
         self._peer.wait_until(is_refused, f'the refusal of {topic}')
@@ -110,7 +110,7 @@ def _whole(run: Run, pids: dict[str, int]) -> None:
     assert dict(launcher.started) == pids, 'a node was started again'
     assert [name for name, pid in pids.items() if not is_node(pid)] == []
     peer.forget()
-    run.wait_for_steps(300)
+    run.wait_for_steps(100)
     peer.wait_until(lambda: peer.messages['/<av>/plan'] and peer.messages['/traffic/agents'],
                     'plans and agents')
     assert not launcher.says('Traceback')

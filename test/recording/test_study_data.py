@@ -349,6 +349,7 @@ def test_what_a_killed_recorder_has_left_is_finished(copied: Path) -> None:
     assert row['scenario'].endswith('.xml') and (copied / row['scenario']).is_file()
 
 
+@pytest.mark.matrix('run.json-empty', 'vehicles.parquet-zeros', 'files.sha256-gone')
 @pytest.mark.parametrize('spoil', [
     lambda path: path.write_bytes(b''), lambda path: path.unlink(),
     lambda path: path.write_bytes(path.read_bytes()[:-30] + bytes(30))],

@@ -79,6 +79,7 @@ def test_nothing_of_the_participant_is_left(copied: Path,
     assert main(['validate', str(copied)]) == 0
 
 
+@pytest.mark.matrix('4')
 @pytest.mark.parametrize('lines', [1, 4, 7])
 def test_an_interrupted_withdrawal_finishes(copied: Path, lines: int) -> None:
     """It is killed behind that many printed lines; until it is finished, no table is written."""

@@ -84,6 +84,7 @@ def test_the_test_of_known_data_is_that_of_r_and_scipy() -> None:
     assert math.isnan(unpaired_test(np.ones(3), np.ones(3), 'two-sided', 0.05).p)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(('keys', 'd_s'), [
     ({'effect': 0.9}, 0.9), ({'effect': -4.0, 'sd': 5.0}, -0.8), ({'effect': 0.0}, 0.0)])
 def test_power_is_that_of_the_closed_form(keys: dict[str, Any], d_s: float) -> None:

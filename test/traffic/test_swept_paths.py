@@ -29,6 +29,7 @@ def corner(radius: float) -> Scenario:
                    adjacent_left=3, adjacent_left_same_direction=False))
 
 
+@pytest.mark.matrix('4.0')
 @pytest.mark.parametrize('radius', [4.0, 7.0, 10.0])
 def test_a_bus_waits_until_the_oncoming_lane_that_it_sweeps_over_is_free(radius: float) -> None:
     """A car stands with its front where the bend ends, for 30 s."""

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rows of a cell in the tables, and the tables' declarations."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, TypedDict
 
 from crgame_ros.analysis.blame.blame import blame_of, KINDS
@@ -96,15 +96,19 @@ def outcome_of(result: OfflineResult, contacts: Sequence[Contact]) -> dict[str, 
             'stopped': result.stop is not None}
 
 
-def vehicle_rows(run: Run, result: OfflineResult,
-                 contacts: Sequence[Contact]) -> list[dict[str, object]]:
+def vehicle_rows(run: Run, result: OfflineResult, contacts: Sequence[Contact],
+                 wanted: Collection[str] | None = None) -> list[dict[str, object]]:
     """
     Return the rows of a run's driven vehicles.
 
     :param contacts: of the run.
+    :param wanted: columns; what is measured for others alone may be left out. None for all.
     """
     rows = []
-    for row in part_rows(VEHICLE_PARTS, run):
+    identity, *parts = VEHICLE_PARTS
+    for row in part_rows([identity, *(
+            part for part in parts if wanted is None
+            or not {column.name for column in part.columns}.isdisjoint(wanted))], run):
         del row['run']
         vehicle = str(row.pop('id'))
         verdicts = [item for item in result.violations if item.vehicle_id == vehicle]

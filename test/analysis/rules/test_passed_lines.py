@@ -156,6 +156,7 @@ def test_a_light_that_is_on_overrules_the_sign() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.matrix('USA_Lanker-1_3_T-1')
 @pytest.mark.parametrize('name', ['USA_Lanker-1_3_T-1', 'DEU_Starnberg-1_1_T-1'])
 def test_agents_run_the_lights_that_the_judge_says(
         name: str, shared_scenarios: Path, project_root: Path,

@@ -28,7 +28,7 @@ def test_the_first_state_that_meets_the_goal(position: Shape | None) -> None:
         time_step=0, position=np.zeros(2), orientation=0.0, velocity=10.0, acceleration=0.0,
         yaw_rate=0.0, slip_angle=0.0), goal)
     random, found = np.random.default_rng(4), set()
-    for _ in range(40):
+    for _ in range(20):
         yaw, speed = random.uniform(-0.4, 0.4), random.uniform(4.0, 10.0)
         start = np.array([0.0, random.uniform(-9.0, 9.0)])
         states = [KSState(time_step=k, steering_angle=0.0, velocity=speed, orientation=yaw,
