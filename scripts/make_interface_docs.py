@@ -26,6 +26,11 @@ nothing has to be built to take part. `external` stands for any other node that 
 The history of every topic is keep last."""
 
 
+def files() -> dict[Path, str]:
+    """Return the page."""
+    return {TARGET: document()}
+
+
 def document(source: Path = SOURCE) -> str:
     """Return the whole page for a contract file."""
     contract = load_contract(source)
@@ -101,4 +106,4 @@ def _escaped(text: str) -> str:
 
 
 if __name__ == '__main__':
-    sys.exit(main_of(__doc__, lambda: {TARGET: document()}))
+    sys.exit(main_of(__doc__, files))

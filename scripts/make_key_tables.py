@@ -171,7 +171,7 @@ def escaped(text: str) -> str:
     return text.replace('|', '\\|').replace('<', '&lt;')
 
 
-def pages() -> dict[Path, str]:
+def files() -> dict[Path, str]:
     """Return every page with up-to-date tables of keys."""
     found = {REFERENCE: reference()}
     for page in sorted(DOCS.glob('*.md')):
@@ -184,4 +184,4 @@ def pages() -> dict[Path, str]:
 
 
 if __name__ == '__main__':
-    sys.exit(main_of(__doc__, pages))
+    sys.exit(main_of(__doc__, files))

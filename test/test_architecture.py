@@ -10,6 +10,7 @@ import networkx as nx
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+pytestmark = pytest.mark.xdist_group('test_architecture')
 sys.path.insert(0, str(ROOT / 'scripts'))
 
 import architecture  # noqa: E402, I100
@@ -106,9 +107,3 @@ def test_no_function_of_the_core_imports_ros(core: list[str]) -> None:
 def test_blocked_imports_fail() -> None:
     """The test above does notice an import of ROS."""
     assert _import_without_ros('rclpy', 'sensor_msgs.msg').returncode == 2
-
-
-@pytest.mark.slow
-def test_list_and_picture_are_up_to_date() -> None:
-    for path, text in architecture.files().items():
-        assert path.read_text(encoding='utf-8') == text, f'run scripts/architecture.py: {path}'

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The interfaces of Gymnasium and PettingZoo, by their own checkers, of every environment."""
 
-import os
-from pathlib import Path
 import subprocess
 import sys
 from typing import Any
@@ -20,7 +18,6 @@ import numpy as np
 from pettingzoo.test import parallel_api_test
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.filterwarnings('error')
 
 
@@ -157,14 +154,6 @@ def test_processes_give_the_same_episodes_as_one() -> None:
             assert first[1] == pytest.approx(second[1], abs=0.0)
     finally:
         apart.close()
-
-
-@pytest.mark.slow
-def test_the_tables_in_the_document_are_up_to_date() -> None:
-    done = subprocess.run([sys.executable, ROOT / 'scripts' / 'make_gym_docs.py', '--check'],
-                          env=os.environ | {'PYTHONPATH': str(ROOT)}, capture_output=True,
-                          text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_the_package_says_what_to_install_where_gymnasium_is_missing() -> None:

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 
+from command_line import crgame
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.game import AvSpec, Game
 from crgame_ros.geometry.angles import wrap_pi_array
@@ -54,12 +55,6 @@ def convert(source: Path, out: Path, **words: object) -> list[Path]:
     """Convert a data set whose format is found."""
     order = DataSetImport(source, find_kind(source), out, **{'limit': 9, 'steps': STEPS} | words)
     return list(convert_data(order, lambda line: None))
-
-
-def crgame(*words: object) -> 'subprocess.Popen[str]':
-    """Start the command `crgame import`."""
-    return subprocess.Popen([sys.executable, '-m', 'crgame_ros.cli', 'import', *map(str, words)],
-                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 @pytest.mark.matrix('interaction', 'mona')
@@ -191,7 +186,10 @@ def test_ctrl_c_leaves_no_half_file(recording: Path, maps: Path, tmp_path: Path,
     for path in sorted(recording.iterdir()):
         for number in range(10, 30):
             shutil.copy(path, path.with_name(path.name.replace('05', str(number))))
-    process = crgame(recording, '--out', out, '--steps', STEPS, '--limit', 1000)
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'crgame_ros.cli', 'import', recording, '--out', out, '--steps',
+         str(STEPS), '--limit', '1000'],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None and process.stdout.readline().startswith(str(out))
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
@@ -210,17 +208,16 @@ def test_ctrl_c_leaves_no_half_file(recording: Path, maps: Path, tmp_path: Path,
     ('05_tracksMeta.csv', lambda text: text.replace('class', 'type'), 'no column class'),
     ('05_recordingMeta.csv', None, 'is missing; 05_tracks.csv is of no use without it'),
 ])
-def test_damaged_recordings_are_refused(recording: Path, table: str, change: object, words: str,
-                                        capfd: pytest.CaptureFixture[str]) -> None:
+def test_damaged_recordings_are_refused(recording: Path, table: str, change: object,
+                                        words: str) -> None:
     """One line says what is wrong with which file, before the converter is called."""
     path = recording / table
     if callable(change):
         path.write_text(change(path.read_text()))
     else:
         path.unlink()
-    process = crgame(recording, '--out', recording / 'out')
-    printed, told = process.communicate(timeout=60)
-    assert process.returncode == 2 and words in told and not printed
+    code, printed, told = crgame(recording, 'import', recording, '--out', recording / 'out')
+    assert code == 2 and words in told and not printed
     assert len([line for line in told.splitlines() if 'error' in line]) == 1
     assert not (recording / 'out').exists()
 
