@@ -16,7 +16,7 @@ import pytest
 if TYPE_CHECKING:
     from selenium.webdriver.chrome.webdriver import WebDriver
 
-PATIENCE_S = 45.0
+PATIENCE_S = 120.0
 WIDTH, HEIGHT = 1280, 720
 _POLL_S = 0.05
 _BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')

@@ -37,7 +37,7 @@ SENSORS = (SensorSpec('front', **EXACT),
            SensorSpec('left', x=1.2, y=0.8, yaw=1.1, field_of_view=2.0, **EXACT))
 # Ranges are 32-bit floats, exact to 4 µm at 80 m; polygons match circles to 1 µm.
 TOLERANCE = 1e-4
-PATIENCE_S = 10.0
+PATIENCE_S = 60.0
 
 
 def _matrix(frame: TransformStamped) -> NDArray[np.float64]:

@@ -25,7 +25,7 @@ from ros_domains import own_domain_id
 from std_msgs.msg import String
 
 OFFSET_NS = 1_000_000_000
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 SCRIPT = 'keys:cut_in.keys.yaml'
 
 

@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from desk_support import DrivesWithoutGraph, write_study  # noqa: E402, I100
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 TIMES = {'shown_at': 10.0, 'answered_at': 12.0, 'taken_s': 2.0}
 KEY = 'a' * 32
 
