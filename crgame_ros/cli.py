@@ -19,7 +19,7 @@ from crgame_ros.version import __version__
 
 class _Tool(NamedTuple):
     """
-    A command whose module declares its options (`add_arguments`) and its action.
+    A command whose module declares its DESCRIPTION, options (`add_arguments`) and action.
 
     :param name: of the command.
     :param does: its purpose, in a few words.
@@ -155,7 +155,10 @@ def _build_parser(chosen: str) -> argparse.ArgumentParser:
     for tool in TOOLS:
         command = commands.add_parser(tool.name, help=tool.does)
         if tool.name == chosen:
-            importlib.import_module(tool.module).add_arguments(command)
+            module = importlib.import_module(tool.module)
+            command.description = module.DESCRIPTION
+            command.formatter_class = argparse.RawDescriptionHelpFormatter
+            module.add_arguments(command)
     doctor = commands.add_parser('doctor', help=DOCTOR)
     doctor.add_argument('--clean', action='store_true',
                         help='remove the shared memory that killed ROS processes have left')

@@ -48,8 +48,6 @@ def purpose_of(kind: type[object]) -> str:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument('kind', nargs='?', choices=tuple(REGISTRIES),
                         help='kind of model (default: all)')
     parser.add_argument('name', nargs='?', help='model, whose options are listed')

@@ -28,7 +28,6 @@ MAX_HUMANS = 16
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
-    parser.description = DESCRIPTION
     add = parser.add_argument
     add('scenario', type=find_scenario, metavar='FILE.xml|ID',
         help='CommonRoad file, or benchmark id')

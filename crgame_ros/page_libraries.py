@@ -149,8 +149,6 @@ def _run(command: Sequence[str], work: Path, limit_s: float) -> None:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.set_defaults(command=run)
 
 

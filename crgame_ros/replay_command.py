@@ -39,8 +39,6 @@ _Runs = tuple[Path, Iterator['Alternative']]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument('run', type=Path, help='folder of a run, or its recording')
     parser.add_argument('--planner', action='append', required=True, metavar='NAME',
                         help='planner of all AVs, or FILE.py:Class; may be repeated')

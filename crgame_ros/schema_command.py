@@ -21,8 +21,6 @@ A YAML file names its schema in its first line, for editors with the YAML langua
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument('kind', nargs='?', default='game', choices=tuple(FILE_KINDS),
                         help='kind of file (default: game)')
     parser.add_argument('--out', type=Path, metavar='FILE', help='write it there, not to stdout')

@@ -22,8 +22,6 @@ is in each column and how to read them."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument('runs', nargs='+', type=Path, metavar='RUN',
                         help='folder of a run, or its recording')
     parser.add_argument('--to', choices=('parquet', 'csv'), default='parquet',

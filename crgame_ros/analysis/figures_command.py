@@ -39,8 +39,6 @@ MOST_PANELS = 60
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
     add('runs', type=Path, nargs='+', metavar='RUN', help='folder of a run, or its recording')
     add('--out', type=Path, metavar='DIR', help='folder to write to; files of the same names in '

@@ -34,8 +34,6 @@ and docs/behaviour.md define each.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument('run', type=Path, help='folder of a run, or its recording')
     parser.add_argument('--epoch', type=int, help='which run of a recording that holds several '
                         '(resets count them from 0; default: the last)')

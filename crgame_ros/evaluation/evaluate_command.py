@@ -77,8 +77,6 @@ docs/evaluation.md tells of plans, tables and clusters."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
     add('plan', nargs='?', type=Path, help='plan file (*.yaml), or the folder of an evaluation')
     add('--out', type=Path, metavar='DIR',

@@ -37,8 +37,6 @@ colons, go before those that were added."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.set_defaults(command=_tell_places)
     actions = parser.add_subparsers(title='actions', metavar='ACTION')
     add = actions.add_parser('add', help='look for scenarios there, too')

@@ -11,6 +11,10 @@ import time
 from crgame_ros.library.lookup import find_scenario
 from crgame_ros.occupancy.map_file import RasterSpec
 
+DESCRIPTION = """\
+Draw the permanent obstacles of a CommonRoad scenario (curbs along the outside of the road, static
+obstacles) as an occupancy map in tiles. Each tile is a map_server map (PGM and YAML). A game takes
+the map with its key "occupancy"."""
 # Shorter work shows no progress [s].
 SILENT_S = 2.0
 REPORT_S = 1.0
@@ -19,10 +23,6 @@ REPORT_S = 1.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     default = RasterSpec()
-    parser.description = (
-        'Draw the permanent obstacles of a CommonRoad scenario (curbs along the outside of the '
-        'road, static obstacles) as an occupancy map in tiles. Each tile is a map_server map '
-        '(PGM and YAML). A game takes the map with its key "occupancy".')
     add = parser.add_argument
     add('scenario', type=find_scenario, help='CommonRoad XML file, or benchmark id')
     add('out', type=Path, help='folder for the map; it must be new')

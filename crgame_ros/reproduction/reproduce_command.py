@@ -32,8 +32,6 @@ EVALUATIONS = ('commonroad-game',)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
     add('evaluation', choices=EVALUATIONS, help='whose evaluation')
     add('--out', type=Path, default=FOLDER, metavar='DIR',

@@ -24,8 +24,6 @@ docs/nodes.md tells which topics these are."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument('file', type=Path, help='the profile, in a folder that exists')
     parser.add_argument('--namespace', default='', metavar='/NAME',
                         help="of the run's nodes (default: none)")

@@ -43,8 +43,6 @@ INSTALL = extra_install('search')
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
     add('game', metavar='GAME|RUN|FOLDER', help='a game file with `vary:`, the name of a game of '
         'this package, a recorded run, or the folder of a search')

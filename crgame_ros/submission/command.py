@@ -30,8 +30,6 @@ _USUAL_OUT = Path('submission.zip')
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
     add('what', nargs='+', metavar='RUN|SCENARIO', help='folders of runs or evaluations, '
         'CommonRoad files or folders of them, benchmark ids, patterns of ids')

@@ -35,8 +35,6 @@ _TOLD = 5
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
     add('games', nargs='+', metavar='GAME|FOLDER', help='game files, folders of them, or names of '
         'games of this package')

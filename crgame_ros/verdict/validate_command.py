@@ -23,8 +23,6 @@ INVALID = 2
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument('files', nargs='+', type=Path, metavar='FILE',
                         help='file or folder, or benchmark id of a scenario')
     parser.set_defaults(command=validate_files)

@@ -10,14 +10,7 @@ from typing import Literal
 
 from crgame_ros.errors import InputError, refusing
 
-# Greatest number of lanes whose cuts are printed.
-_TOLD = 10
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the command."""
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.description = """\
+DESCRIPTION = """\
 Turn way-point roads (CSV) into a CommonRoad scenario to drive on, or back.
 
   crgame roads roads.csv town.xml     lanes become lanelets; a game takes town.xml as its scenario
@@ -28,6 +21,12 @@ lanes are linked; docs/roads.md tells more. A lane is cut into lanelets where it
 With --start and --goal the scenario has a planning problem, that is, an AV can drive there:
 
   crgame roads roads.csv town.xml --start 7:10:8.3 --goal 9"""
+# Greatest number of lanes whose cuts are printed.
+_TOLD = 10
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
     add = parser.add_argument
     add('source', metavar='IN', type=Path, help='way-points (.csv) or scenario (.xml)')
     add('out', metavar='OUT', type=Path, help='scenario (.xml) or way-points (.csv)')

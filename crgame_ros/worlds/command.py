@@ -31,8 +31,6 @@ A map counts as imported when an AV has driven on it in dense traffic."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
     add('source', metavar='FILE|FOLDER', type=Path,
         help='a map, the folder of a data set, or the tracks of one recording')

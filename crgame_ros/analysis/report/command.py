@@ -20,8 +20,6 @@ The file opens in any browser, without network. docs/report.md shows one."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument('runs', type=Path, nargs='+', metavar='RUN',
                         help='folder of a run, or its recording')
     parser.add_argument('--out', type=Path, metavar='FILE.html',

@@ -35,8 +35,6 @@ docs/studies.md leads through an example."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.description = DESCRIPTION
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     what = parser.add_subparsers(title='what', metavar='WHAT', required=True)
     new = what.add_parser('new', help='write a commented study file with its pages')
     new.add_argument('folder', type=Path, help='is made')
