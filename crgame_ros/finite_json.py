@@ -4,8 +4,15 @@
 
 from collections.abc import Iterable, Mapping
 import math
+from typing import overload
 
 
+@overload
+def finite(value: float) -> float | None: ...
+@overload
+def finite(value: Mapping[str, object]) -> dict[str, object]: ...
+@overload
+def finite(value: object) -> object: ...
 def finite(value: object) -> object:
     """Replace NaN and infinities, which JSON does not have, by null."""
     if isinstance(value, float):

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from crgame_ros.analysis.behaviour.driver_controls import DriverControls
 from crgame_ros.analysis.behaviour.reactions import hands_on_after, reaction_to
+from crgame_ros.finite_json import finite
 from crgame_ros.game.task_documents import NOT_MEASURED, PageTimes, TaskEntry
 from crgame_ros.game.task_spec import DetectionResponse, TaskKind
 from crgame_ros.instruments.run_clock import run_times_s
@@ -180,8 +181,7 @@ class DetectionScore(NamedTuple):
 
     def as_dict(self) -> dict[str, object]:
         """Return the fields as a JSON-compatible dictionary; undefined values are None."""
-        return {key: None if isinstance(value, float) and math.isnan(value) else value
-                for key, value in self._asdict().items()}
+        return finite(self._asdict())
 
 
 def detection_scores(events: Sequence[TaskEvent]) -> list[DetectionScore]:

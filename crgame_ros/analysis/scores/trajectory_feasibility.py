@@ -12,6 +12,7 @@ from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.state import TraceState
 from commonroad.scenario.trajectory import Trajectory
 from crgame_ros.errors import one_line
+from crgame_ros.finite_json import finite
 import numpy as np
 from numpy.typing import NDArray
 
@@ -68,8 +69,8 @@ class TrajectoryFeasibility:
             'feasible': self.feasible, 'first_step': self.first_step, 'reason': self.reason,
             'transitions': self.transitions, 'infeasible': self.infeasible,
             # Infinite where no inputs were found.
-            'position_error_m': _finite(self.position_error),
-            'heading_error_rad': _finite(self.heading_error),
+            'position_error_m': finite(self.position_error),
+            'heading_error_rad': finite(self.heading_error),
             'excess_acceleration_m_s2': self.excess_acceleration,
             'excess_steering_rate_rad_s': self.excess_steering_rate,
             'excess_friction_m_s2': self.excess_friction, 'step_s': self.step_s}
@@ -120,10 +121,6 @@ def check_feasibility(found: PlanningProblemSolution, problem: PlanningProblem, 
 def _dynamics(found: PlanningProblemSolution) -> 'VehicleDynamics':
     from crgame_ros.analysis.scores.checker import VehicleDynamics
     return VehicleDynamics.from_model(found.vehicle_model, found.vehicle_type)
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _transition(now: TraceState, then: TraceState, dynamics: 'VehicleDynamics', step_s: float

@@ -3,13 +3,13 @@
 """The summary of an evaluation's cells, as data."""
 
 from dataclasses import asdict, dataclass
-import math
 from pathlib import Path
 import re
 import shlex
 from typing import Literal
 
 from crgame_ros.evaluation.summary.measures import SummaryMeasure
+from crgame_ros.finite_json import finite
 
 _KEY = re.compile('[0-9a-f]{32}')
 Clustered = Literal['scenarios', 'scenarios and participants', 'participants', 'runs']
@@ -205,13 +205,4 @@ class Summary:
         for failure in found['failures']:
             failure['cells'] = [{'labels': labels, 'cells': cells}
                                 for labels, cells in failure['cells']]
-        return {name: _known(value) for name, value in found.items()}
-
-
-def _known(value: object) -> object:
-    """Return a value in which those that JSON cannot represent are replaced."""
-    if isinstance(value, dict):
-        return {key: _known(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_known(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        return finite(found)

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import hashlib
 import json
-import math
 from pathlib import Path
 import shutil
 from typing import Any
@@ -16,6 +15,7 @@ from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.run_tables import tables_of
 from crgame_ros.errors import refusing
 from crgame_ros.evaluation.source_digest import engine_digest
+from crgame_ros.finite_json import finite
 from crgame_ros.recording.run_folder import bags_of
 from crgame_ros.whole_file import whole_folder
 import pyarrow as pa
@@ -125,12 +125,8 @@ def _summary(run: Run) -> dict[str, object]:
         'tasks': [{
             'kind': str(each.kind), 'what': each.what, 'name': each.name, 'seat': each.seat,
             'outcome': each.outcome, 'onset_s': each.onset_s,
-            'duration_s': _known(each.duration_s),
-            'response_time_s': _known(each.response_time_s)} for each in task_events(run.record)]}
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+            'duration_s': finite(each.duration_s),
+            'response_time_s': finite(each.response_time_s)} for each in task_events(run.record)]}
 
 
 def _key(run: Path, name: str) -> str:
