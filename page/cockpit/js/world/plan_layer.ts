@@ -5,7 +5,7 @@
 import { PLAN_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 
 import type { PlanFrame } from '../frames.js';
-import type { FiredEvent, Scene } from '../messages.js';
+import type { Shown, Store } from '../store.js';
 import type { LiveView } from './painter.js';
 import type { DrawnVehicle } from './vehicle_layer.js';
 
@@ -17,52 +17,30 @@ const DOT_PX = [1.8, 5];
 const BAND_ALPHA = 0.22;
 const FADED = 0.2;
 
-/** Plans of all AVs that are not hidden. */
-export class PlanLayer {
-  #hidden = new Set<string>();
-
-  /** Whether plans are shown at all. */
-  on = true;
-
-  /**
-   * Update which AVs' plans are hidden, from the fired events.
-   *
-   * @param scene with the definitions of the events
-   * @param fired in order
-   */
-  applyEvents(scene: Scene | null, fired: FiredEvent[]) {
-    this.#hidden.clear();
-    for (const { name } of fired) {
-      const event = scene?.events.find((entry) => entry.name === name);
-      if (event?.kind === 'plan_display') {
-        if (event.show) {
-          this.#hidden.delete(event.av);
-        } else {
-          this.#hidden.add(event.av);
-        }
-      }
+/** Return the plans of the AVs that are present, without those that an event has hidden. */
+export function shownPlans({ scene, fired, plans }: Store, shown: Shown): PlanFrame[] {
+  const hidden = new Set<string>();
+  for (const { name } of fired) {
+    const event = scene?.events.find((entry) => entry.name === name);
+    if (event?.kind === 'plan_display') {
+      hidden[event.show ? 'delete' : 'add'](event.av);
     }
   }
+  return [...plans.values()].filter(({ index }) => {
+    const av = scene?.vehicles[index];
+    return av !== undefined && !hidden.has(av.id)
+      && Number.isFinite(shown.vehicles[index * VEHICLE_WIDTH]);
+  });
+}
 
-  /**
-   * @param id of an AV
-   * @returns whether its plan is shown
-   */
-  shows(id: string): boolean {
-    return this.on && !this.#hidden.has(id);
-  }
+/** The layer of plans. */
+export class PlanLayer {
+  on = true;
 
   /** Draw the future part of each plan. */
   draw(context: CanvasRenderingContext2D, view: LiveView, vehicles: DrawnVehicle[]) {
-    if (!this.on) {
-      return;
-    }
-    for (const plan of view.store.plans.values()) {
-      const vehicle = vehicles[plan.index];
-      if (vehicle !== undefined && this.shows(vehicle.id)
-          && Number.isFinite(view.shown.vehicles[plan.index * VEHICLE_WIDTH])) {
-        this.#drawPlan(context, view, plan, vehicle);
-      }
+    for (const plan of this.on ? shownPlans(view.store, view.shown) : []) {
+      this.#drawPlan(context, view, plan, vehicles[plan.index]);
     }
   }
 

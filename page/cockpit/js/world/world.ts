@@ -223,7 +223,6 @@ export class World {
     store.on('scene', (scene) => this.#load(scene));
     store.on('objects', (step) => this.#painter.vehicles.brakeLights.update(step));
     store.on('hello', () => this.#sendLayers());
-    store.on('events', () => this.#painter.plans.applyEvents(store.scene, store.fired));
     for (const name of REDRAWN_ON) {
       store.on(name, () => this.redraw());
     }
@@ -260,7 +259,6 @@ export class World {
   #load(scene: Scene) {
     this.#painter.load(scene);
     this.#view.scene = scene;
-    this.#painter.plans.applyEvents(scene, this.#store.fired);
     this.#navigation.load(scene, this.#follow);
   }
 
