@@ -5,7 +5,6 @@
 import { MeshBuilder } from './bodies/mesh_builder.js';
 import { geometryOf } from './instances.js';
 
-import type { Mesh } from 'three';
 import type { SceneVehicle } from '../messages.js';
 import type { Point, Tint } from './bodies/mesh_builder.js';
 import type { Three } from './three.js';
@@ -20,7 +19,7 @@ const PILLAR_M = 0.05;
  * @param paint its colour
  * @returns seen from the driver's eye only
  */
-export function createCabin(three: Three, vehicle: SceneVehicle, paint: number): Mesh {
+export function createCabin(three: Three, vehicle: SceneVehicle, paint: number) {
   const mesh = new MeshBuilder();
   const { red, green, blue } = rgbOf(three, paint);
   addBonnet(mesh, vehicle, [red, green, blue]);

@@ -11,13 +11,12 @@ import { Mirrors } from './mirrors.js';
 import { PlanRibbons } from './plan_ribbons.js';
 import { isSoftware, Quality } from './quality.js';
 import { createRoadWorld } from './road/road_world.js';
-import { roleColor } from './role_color.js';
 import { sightOf } from './seen_instances.js';
 import { product } from './solid_boxes.js';
 import { Traffic } from './traffic.js';
 import { standOf } from './vehicle_stand.js';
 
-import type { Mesh, PerspectiveCamera } from 'three';
+import type { PerspectiveCamera } from 'three';
 import type { Scene, SceneVehicle } from '../messages.js';
 import type { Shown, Store } from '../store.js';
 import type { CameraPose, Stand, Viewpoint } from './cameras.js';
@@ -59,7 +58,7 @@ export class Picture {
   #size = { width: 1, height: 1 };
   #road: RoadWorld | null = null;
   #document: Scene | null = null;
-  #cabin: { mesh: Mesh; vehicle: SceneVehicle } | null = null;
+  #cabin: { mesh: ReturnType<typeof createCabin>; vehicle: SceneVehicle } | null = null;
   #origin = { x: 0, y: 0 };
   #last: { stand: Stand; mirrors: boolean; inside: boolean } | null = null;
   store;
@@ -272,6 +271,7 @@ export class Picture {
     if (inside && this.#cabin?.vehicle !== vehicle) {
       this.#cabin?.mesh.removeFromParent();
       this.#cabin?.mesh.geometry.dispose();
+      this.#cabin?.mesh.material.dispose();
       const mesh = createCabin(this.#three, vehicle, this.#traffic.paintOf(vehicle.id));
       this.#scene.add(mesh);
       this.#cabin = { mesh, vehicle };
@@ -313,7 +313,7 @@ export class Picture {
     }
     this.#document = scene;
     this.#choose();
-    this.#traffic.load(scene, this.#origin, roleColor(this.#three));
+    this.#traffic.load(scene, this.#origin);
   }
 }
 

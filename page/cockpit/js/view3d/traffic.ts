@@ -5,6 +5,7 @@
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { shining } from '../lights.js';
 import { BrakeLights } from '../world/brake_lights.js';
+import { colorNameOf, themeColor } from '../world/palette.js';
 import { ofObject, ofVehicle } from './bodies/appearance.js';
 import { plainBody } from './bodies/plain_bodies.js';
 import { FittedParts } from './fitted_parts.js';
@@ -82,11 +83,8 @@ export class Traffic {
     store.on('objects', (step) => this.#brakeLights.update(step));
   }
 
-  /**
-   * @param origin of the coordinates in the group
-   * @param colorOf returns its colour on the map
-   */
-  load(scene: Scene, origin: Origin, colorOf: (role: string, type: string) => number) {
+  /** @param origin of the coordinates in the group */
+  load(scene: Scene, origin: Origin) {
     this.#clear();
     this.#scene = scene;
     this.#origin = origin;
@@ -103,12 +101,12 @@ export class Traffic {
       this.#instances.set(key, new Instances(this.#three, this.#group, body.mesh, count,
         plainBody(look.key, body)));
     }
-    const things = looks.map((look, i) => {
-      const vehicle = scene.vehicles[i];
-      const object = scene.objects[i - scene.vehicles.length];
-      return this.#thing(look, bodies.get(look.key) as Body,
-        vehicle?.id ?? object.id, vehicle ? colorOf(vehicle.role, vehicle.type)
-          : colorOf(object.role, object.type));
+    const colors = new Map<string, number>();
+    const things = [...scene.vehicles, ...scene.objects].map((thing, i) => {
+      const name = colorNameOf(thing);
+      const color = colors.get(name) ?? new this.#three.Color(themeColor(name)).getHex();
+      colors.set(name, color);
+      return this.#thing(looks[i], bodies.get(looks[i].key) as Body, thing.id, color);
     });
     this.#vehicles = things.slice(0, scene.vehicles.length);
     this.#objects = things.slice(scene.vehicles.length);

@@ -10,6 +10,13 @@ const NAMES = [
   'map-label-ground', 'map-overlay', 'map-ray', 'map-estimate', 'map-occupied',
 ] as const;
 
+/** Return the name of a vehicle's or object's colour: that of its driver, else of its kind. */
+export function colorNameOf({ role, type }: { role: string; type: string }): ColorName {
+  return role === 'human' ? role : role === 'autonomous' ? 'av'
+    : type === 'pedestrian' || type === 'bicycle' ? 'vulnerable'
+      : role === 'traffic' || role === 'scripted' || role === 'static' ? role : 'recorded';
+}
+
 /**
  * Resolve a custom property to a colour for canvas and plots.
  *

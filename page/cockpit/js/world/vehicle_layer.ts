@@ -6,6 +6,7 @@ import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { LIGHT, shining } from '../lights.js';
 import { BrakeLights } from './brake_lights.js';
 import { drawOutline } from './hollow.js';
+import { colorNameOf } from './palette.js';
 import { vehicleLook, TYRE } from './vehicle_shape.js';
 
 import type { Pose, Scene, SceneObject, SceneVehicle } from '../messages.js';
@@ -43,11 +44,11 @@ export class VehicleLayer {
   load(scene: Scene) {
     this.vehicles = scene.vehicles.map((vehicle) => ({
       ...vehicle, look: vehicleLook(vehicle.type, vehicle.shape, true),
-      color: vehicle.role === 'human' ? 'human' : 'av',
+      color: colorNameOf(vehicle),
     }));
     this.objects = scene.objects.map((object) => ({
       ...object, look: vehicleLook(object.type, object.shape, object.role !== 'static'),
-      color: colorOf(object),
+      color: colorNameOf(object),
     }));
     this.brakeLights.load(this.objects.length);
   }
@@ -250,11 +251,4 @@ function centerOf({ rear_to_center: ahead }: SceneVehicle, rows: Float64Array,
       x: rows[row] + ahead * Math.cos(yaw), y: rows[row + 1] + ahead * Math.sin(yaw), yaw,
       speed: Math.abs(rows[row + VEHICLE.speed]),
     } : null;
-}
-
-function colorOf({ type, role }: SceneObject): ColorName {
-  if (type === 'pedestrian' || type === 'bicycle') {
-    return 'vulnerable';
-  }
-  return role === 'traffic' || role === 'scripted' || role === 'static' ? role : 'recorded';
 }

@@ -152,7 +152,7 @@ function above([x, y, z]: Triple, base: number): Triple {
 }
 
 /** Draw the masks of lamps, by direction. */
-function lampMasks(): { canvas: HTMLCanvasElement; cells: Record<string, Cell> } {
+export function lampMasks(): { canvas: HTMLCanvasElement; cells: Record<string, Cell> } {
   const canvas = document.createElement('canvas');
   const names = Object.keys(ARROWS);
   canvas.width = MASK_PX * 8;
@@ -166,6 +166,7 @@ function lampMasks(): { canvas: HTMLCanvasElement; cells: Record<string, Cell> }
     context.fillStyle = '#ffffff';
     const arrows = ARROWS[name];
     if (arrows.length === 0) {
+      context.beginPath();
       context.arc(0, 0, 1, 0, 2 * Math.PI);
       context.fill();
     }
