@@ -3,7 +3,7 @@
 /** The run in the header: start, pause, step, reset, stop, speed of time, clock, recording. */
 
 import { element, part, setAttribute, setText } from './dom.js';
-import { isTyping } from './driving/focus.js';
+import { isCommand } from './driving/focus.js';
 import { icon } from './driving/icons.js';
 import { confirm } from './panels/confirm.js';
 import { reasonAgainst, reasonAgainstOrder } from './rights.js';
@@ -134,8 +134,7 @@ class RunControl {
   }
 
   #key(event: KeyboardEvent) {
-    if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)
-        || document.querySelector('dialog[open]') || this.#root.hidden
+    if (event.repeat || !isCommand(event) || this.#root.hidden
         // A driver may press a key by mistake; only a director controls the experiment.
         || reasonAgainst(this.#store, 'direct', 'pause') !== '') {
       return;

@@ -3,7 +3,7 @@
 /** The R key: holding it restarts the run, tapping it selects the reverse gear. */
 
 import { element, setAttribute, setText } from '../dom.js';
-import { isTyping } from '../driving/focus.js';
+import { isCommand } from '../driving/focus.js';
 import { reasonAgainstOrder } from '../rights.js';
 
 import type { Connection } from '../connection.js';
@@ -42,8 +42,7 @@ export function createRestart(root: HTMLElement, store: Store,
     }
   };
   window.addEventListener('keydown', (event) => {
-    if (event.code !== KEY || event.repeat || event.ctrlKey || event.metaKey || event.altKey
-        || isTyping(event.target) || document.querySelector('dialog[open]')
+    if (event.code !== KEY || event.repeat || !isCommand(event)
         || store.mode !== 'live' || !store.connected || store.status === null) {
       return;
     }

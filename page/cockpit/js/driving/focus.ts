@@ -12,6 +12,12 @@ export function isTyping(target: EventTarget | null): boolean {
   return target instanceof Element && target.closest(EDITABLE) !== null;
 }
 
+/** Return whether a key may be a command: not with a modifier, in a text or behind a dialog. */
+export function isCommand(event: KeyboardEvent): boolean {
+  return !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping(event.target)
+    && document.querySelector('dialog[open]') === null;
+}
+
 /** A watch on focus, visibility, dialogs and the connection. */
 export class Focus {
   #store;

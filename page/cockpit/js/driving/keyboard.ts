@@ -4,7 +4,7 @@
 
 import { HELD_MS } from '../after/restart_key.js';
 import { LIGHT_BUTTONS } from '../lights.js';
-import { isTyping } from './focus.js';
+import { isCommand, isTyping } from './focus.js';
 
 export type KeyAction = 'throttle' | 'brake' | 'left' | 'right' | 'reverse' | 'put_back'
   | typeof LIGHT_BUTTONS[number];
@@ -115,8 +115,7 @@ export class Keyboard {
       return;
     }
     const action = ACTIONS[event.code];
-    if (!action || event.ctrlKey || event.metaKey || event.altKey || event.isComposing
-        || isTyping(event.target) || !this.#enabled()) {
+    if (!action || event.isComposing || !isCommand(event) || !this.#enabled()) {
       return;
     }
     event.preventDefault();

@@ -3,7 +3,7 @@
 /** Sound and rumble of the vehicle whose seat this page holds, else of the followed one. */
 
 import { connectedPads } from '../driving/gamepad.js';
-import { isTyping } from '../driving/focus.js';
+import { isCommand } from '../driving/focus.js';
 import { recall, remember } from '../panels/memory.js';
 import { Kerbs } from './kerbs.js';
 import { Listener } from './listener.js';
@@ -132,9 +132,7 @@ export class Sound {
   }
 
   #key(event: KeyboardEvent) {
-    const free = !event.repeat && !event.ctrlKey && !event.metaKey && !event.altKey
-      && !isTyping(event.target) && !document.querySelector('dialog[open]');
-    if (event.code === KEY && free && this.#keys && this.allowed) {
+    if (event.code === KEY && !event.repeat && isCommand(event) && this.#keys && this.allowed) {
       event.preventDefault();
       this.toggle();
     } else {

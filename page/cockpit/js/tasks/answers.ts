@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The inputs by which a driver answers: a key and a button for each kind of task, touch. */
 
-import { isTyping } from '../driving/focus.js';
+import { isCommand } from '../driving/focus.js';
 import { connectedPads } from '../driving/gamepad.js';
 import { LIGHT_BUTTONS } from '../lights.js';
 
@@ -108,12 +108,10 @@ export class Answers {
   }
 
   #key(event: KeyboardEvent) {
-    const free = !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping(event.target)
-      && !document.querySelector('dialog[open]');
     const inputs = this.#inputs();
     const what = (['light', 'request'] as const).find((each) => inputs[each]?.key === event.code
       || (inputs[each]?.key === 'Enter' && event.key === 'Enter'));
-    if (free && what !== undefined && this.#wanted(what)) {
+    if (isCommand(event) && what !== undefined && this.#wanted(what)) {
       event.preventDefault();
       event.stopPropagation();
       if (!event.repeat) {

@@ -3,7 +3,7 @@
 /** The 3D view beside the map: the choice of the two, the viewpoint and the times of drawing. */
 
 import { element } from '../dom.js';
-import { isTyping } from '../driving/focus.js';
+import { isCommand, isTyping } from '../driving/focus.js';
 import { VIEWPOINTS } from './cameras.js';
 import { acrossAngle, heightAngle } from './field_of_view.js';
 import { KeyAnswer } from './key_answer.js';
@@ -185,8 +185,7 @@ export class View3d {
   }
 
   #pressed(event: KeyboardEvent) {
-    if (!this.keys || event.ctrlKey || event.metaKey || event.altKey || event.repeat
-        || isTyping(event.target)) {
+    if (!this.keys || event.repeat || !isCommand(event)) {
       return;
     }
     const key = event.key.toLowerCase();

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Keys of the world; the driving keys (W A S D, arrows, space, R) are not among them. */
 
-import { isTyping } from '../driving/focus.js';
+import { isCommand } from '../driving/focus.js';
 
 import type { WorldActions } from './toolbar.js';
 
@@ -27,7 +27,7 @@ export function attachKeys(actions: WorldActions): () => void {
     l: () => actions.toggleLabels(),
   };
   const pressed = (event: KeyboardEvent) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) {
+    if (!isCommand(event)) {
       return;
     }
     const action = bindings[event.key.toLowerCase()];
