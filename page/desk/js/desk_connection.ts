@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The WebSocket to the desk's server: it reconnects and estimates the server's clock. */
 
+import { ServerClock } from '../../cockpit/js/server_clock.js';
+
 import type { PongMessage } from './desk_messages.js';
 import type { ExperimenterMessage, ParticipantMessage, Ping } from './page_messages.js';
 
@@ -25,8 +27,9 @@ export class DeskConnection<Message extends { type: string }> {
   #socket: WebSocket | null = null;
   #retry_ms = FIRST_RETRY_MS;
   #opened = false;
-  #offset_s = 0;
-  #best_ms = Infinity;
+  #clock = new ServerClock();
+  // Until the first pong: its server may run on another machine.
+  #anew = true;
   /** The round-trip time [ms]; NaN before it is known. */
   round_trip_ms = NaN;
 
@@ -42,7 +45,8 @@ export class DeskConnection<Message extends { type: string }> {
 
   /** The server's clock now [s since 1970], by the page's estimate. */
   get now_s() {
-    return (performance.timeOrigin + performance.now()) / 1000 + this.#offset_s;
+    const now_ms = performance.now();
+    return this.#clock.at(now_ms)?.steady_s ?? (performance.timeOrigin + now_ms) / 1000;
   }
 
   /** @returns false when there is no connection */
@@ -58,7 +62,7 @@ export class DeskConnection<Message extends { type: string }> {
     const socket = new WebSocket(this.#url);
     socket.addEventListener('open', () => {
       this.#retry_ms = FIRST_RETRY_MS;
-      this.#best_ms = Infinity;
+      this.#anew = true;
       this.#ping();
       this.#listener.opened(this.#opened);
       this.#opened = true;
@@ -87,10 +91,10 @@ export class DeskConnection<Message extends { type: string }> {
     const { t, at } = message as PongMessage;
     const now_ms = performance.now();
     this.round_trip_ms = now_ms - t;
-    // The shortest round trip gives the best estimate of the other clock.
-    if (this.round_trip_ms <= this.#best_ms) {
-      this.#best_ms = this.round_trip_ms;
-      this.#offset_s = at - (performance.timeOrigin + (now_ms + t) / 2) / 1000;
+    if (this.#anew) {
+      this.#clock.forget();
+      this.#anew = false;
     }
+    this.#clock.add(t, now_ms, at);
   }
 }

@@ -75,8 +75,9 @@ export class DeviceCheck {
     this.#poll();
   }
 
-  /** Stop listening. */
+  /** Stop listening, and leave nothing in the page. */
   end() {
+    this.#calibration.remove();
     cancelAnimationFrame(this.#frame);
     window.removeEventListener('keydown', this.#key, true);
   }

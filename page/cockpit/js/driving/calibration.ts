@@ -74,6 +74,12 @@ export class CalibrationDialog {
     this.#poll(performance.now());
   }
 
+  /** Close it, and take it out of the page. */
+  remove() {
+    this.#dialog.close();
+    this.#dialog.remove();
+  }
+
   #poll(now_ms: number) {
     const pad = connectedPads().find(({ index }) => index === this.#pad?.index);
     if (pad === undefined) {
