@@ -3,16 +3,16 @@
 /** The bare page of a driver: it takes its seat and reports to the framing page. */
 
 import { element, setAttribute, setText } from '../dom.js';
+import { languageOf, WORDS } from '../driver_words.js';
 import { keepProfiles } from '../driving/gamepad_profile.js';
 import { FrameLink } from './frame_link.js';
 import { readStage } from './stage_address.js';
-import { WORDS } from './stage_words.js';
 
 import type { Connection } from '../connection.js';
+import type { StageTrouble } from '../driver_words.js';
 import type { Store } from '../store.js';
 import type { StageAddress } from './stage_address.js';
 import type { StageOrder, StageState, StageView } from './stage_messages.js';
-import type { StageTrouble } from './stage_words.js';
 
 // Least interval of reports to the framing page [ms].
 const EVERY_MS = 100;
@@ -25,7 +25,7 @@ export class Stage {
   #store;
   #connection;
   #link;
-  #words;
+  #words = WORDS.en;
   #line = element('div', { class: 'stage-line', role: 'alert', hidden: true });
   #role = '';
   #claimed_ms = -Infinity;
@@ -43,10 +43,9 @@ export class Stage {
     this.address = address;
     this.#store = store;
     this.#connection = connection;
-    this.#words = WORDS[address.lang];
     this.#link = new FrameLink(store, (order) => this.#obey(order));
-    document.documentElement.lang = address.lang;
     root.append(this.#line);
+    this.#speak();
     document.addEventListener('contextmenu', (event) => event.preventDefault());
     store.on('notice', ({ level, text }) => {
       this.#failed = level === 'error' ? text : this.#failed;
@@ -57,6 +56,7 @@ export class Stage {
       this.#claimRole();
     });
     store.on('epoch', () => { this.#before = this.#begun ? this.#pictures : NaN; });
+    store.on('scene', () => this.#speak());
     store.on('seats', () => this.#update());
     store.on('connection', () => this.#update());
     this.#claimRole();
@@ -70,7 +70,7 @@ export class Stage {
     for (const [layer, on] of Object.entries({ labels: names, plans, goals: plans })) {
       world.setLayer(layer, on);
     }
-    this.#writeLabels();
+    this.#speak();
     window.crgame.sound?.want(sound);
     if (view3d !== undefined) {
       view3d.keys = change;
@@ -97,7 +97,11 @@ export class Stage {
     return view3d?.on ? view3d.stats?.frames ?? 0 : world.stats.frames;
   }
 
-  #writeLabels() {
+  /** Use the language of the address, or else of the game, once it is known. */
+  #speak() {
+    const language = languageOf(window.location.search, this.#store.scene?.language);
+    this.#words = WORDS[language];
+    document.documentElement.lang = language;
     for (const name of ['throttle', 'brake'] as const) {
       const label = document.querySelector(`.pedal-${name} .bar-label`);
       if (label !== null) {

@@ -21,7 +21,6 @@ export interface StageAddress {
   change: boolean; // whether V and C change the view
   fieldOfView_deg: number | null; // across the picture; null for the browser's own [deg]
   corner: typeof CORNERS[number] | null; // that is white while a stimulus is shown
-  lang: 'en' | 'de'; // of the texts of the stage
 }
 
 /**
@@ -46,6 +45,5 @@ export function readStage(query: string): StageAddress | null {
     sound: flag('sound', true), mirrors: flag('mirrors', true), change: flag('change', false),
     fieldOfView_deg: angle >= FIELD_OF_VIEW.least && angle <= FIELD_OF_VIEW.most ? angle : null,
     corner: CORNERS.find((name) => name === values.get('corner')) ?? null,
-    lang: values.get('lang') === 'de' ? 'de' : 'en',
   };
 }

@@ -3,11 +3,11 @@
 /** The tasks of the driver at this page: their view, and answers timed by the page's clock. */
 
 import { attends } from '../attending.js';
+import { labelsOf, languageOf, WORDS } from '../driver_words.js';
 import { Answers, keyName } from './answers.js';
 import { inPicture, Prompt } from './prompt.js';
 import { RequestTone } from './request_tone.js';
 import { RunningTime } from './running_time.js';
-import { labelsOf, languageOf, wordsIn } from './task_words.js';
 import { TaskView } from './task_view.js';
 
 import type { Connection } from '../connection.js';
@@ -25,7 +25,7 @@ export class Tasks {
   #answers;
   /** The open prompts of this page, by task and number. */
   #prompts = new Map<string, Prompt>();
-  #words = wordsIn('en');
+  #words = WORDS.en;
   #labels = labelsOf(window.location.search);
   #frameRequested = false;
 
@@ -121,7 +121,7 @@ export class Tasks {
 
   #begin() {
     const language = languageOf(window.location.search, this.#store.scene?.language);
-    this.#words = wordsIn(language);
+    this.#words = WORDS[language];
     this.#view.speak(this.#words, language);
     this.#update();
   }
