@@ -204,6 +204,17 @@ test('a reset while the pause is awaited ends the wish to look', async () => {
   assert.deepEqual(did, []);
 });
 
+test('a connection that is lost while the pause is awaited ends the wish to look', async () => {
+  touch();
+  await click(button('look'));
+  store.setConnected(false);
+  await click(document.body);
+  store.setConnected(true);
+  status({ run: 'paused' });
+  await click(document.body);
+  assert.deepEqual(did, []);
+});
+
 /** Hold the run after a contact. */
 const hold = async () => {
   touch();

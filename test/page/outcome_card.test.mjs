@@ -28,6 +28,9 @@ beforeEach(() => {
   answer = { vehicles: [], refusal: '' };
   mock.method(globalThis, 'fetch', async (path) => {
     asked.push(path);
+    if (answer === null) {
+      throw new TypeError('Failed to fetch');
+    }
     return new Response(JSON.stringify(answer));
   });
   globalThis.window.crgame = { lastSeconds: { open: () => did.push('look') },
@@ -222,6 +225,21 @@ test('a run without a score says why', async () => {
   await settle();
   assert.equal(score(), 'No score: the recording is <b>broken</b>');
   assert.equal(asked.length, 3);
+});
+
+test('a score that the server could not give is asked for again with a new connection', async () => {
+  answer = null;
+  end('duration');
+  files();
+  await settle();
+  store.setConnected(false);
+  await settle();
+  assert.equal(score(), 'No score: The server does not answer.');
+  answer = { vehicles: [], refusal: 'it is too short' };
+  store.setConnected(true);
+  await settle();
+  assert.equal(score(), 'No score: it is too short');
+  assert.equal(asked.length, 2);
 });
 
 test('the card of a run that is over leads to the next one', async () => {

@@ -32,10 +32,7 @@ class Lobby {
     this.#connection = connection;
     stage.append(this.#countdown);
     document.querySelector('#panel-drive')?.prepend(this.#section);
-    for (const event of ['hello', 'you', 'seats', 'status',
-      'connection'] as const) {
-      store.on(event, () => this.#show());
-    }
+    store.on(['hello', 'you', 'seats', 'status', 'connection'], () => this.#show());
     this.#show();
   }
 

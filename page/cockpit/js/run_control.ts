@@ -69,10 +69,7 @@ class RunControl {
     this.#root.append(...Object.values(this.#buttons),
       element('label', { class: 'run-factor' }, element('span', { text: 'Speed' }), this.#factor));
     window.addEventListener('keydown', (event) => this.#key(event));
-    for (const name of ['hello', 'you', 'status', 'connection',
-      'seats'] as const) {
-      store.on(name, () => this.#show());
-    }
+    store.on(['hello', 'you', 'status', 'connection', 'seats'], () => this.#show());
     this.#show();
   }
 

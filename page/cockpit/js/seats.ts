@@ -60,9 +60,7 @@ class Seats {
       this.#stale = false;
       this.#show();
     });
-    for (const event of ['hello', 'you', 'scene', 'status'] as const) {
-      store.on(event, () => this.#show());
-    }
+    store.on(['hello', 'you', 'scene', 'status'], () => this.#show());
     store.on('connection', (connected) => connected || this.#disconnected());
     this.#show();
   }

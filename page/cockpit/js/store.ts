@@ -122,17 +122,19 @@ export class Store {
   #historySource: HistorySource | null = null;
 
   /**
-   * Listen to an event.
+   * Listen to one or several events.
    *
-   * @param name of the event
    * @param listener called after the store has stored the content
    * @returns ends it
    */
-  on<Name extends keyof StoreEvents>(name: Name,
+  on<Name extends keyof StoreEvents>(names: Name | Name[],
     listener: (content: StoreEvents[Name]) => void): () => void {
-    const listeners = this.#listeners.get(name) ?? new Set();
-    this.#listeners.set(name, listeners.add(listener));
-    return () => listeners.delete(listener);
+    const sets = [names].flat().map((name) => {
+      const listeners = this.#listeners.get(name) ?? new Set();
+      this.#listeners.set(name, listeners.add(listener));
+      return listeners;
+    });
+    return () => sets.forEach((listeners) => listeners.delete(listener));
   }
 
   /**

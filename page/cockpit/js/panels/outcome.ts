@@ -86,9 +86,7 @@ class Outcome {
         this.#result.clearFiles();
       }
     });
-    for (const name of ['hello', 'you', 'scene', 'seats', 'status', 'connection'] as const) {
-      store.on(name, () => this.#show());
-    }
+    store.on(['hello', 'you', 'scene', 'seats', 'status', 'connection'], () => this.#show());
     store.on('epoch', () => {
       this.#told = 0;
       this.#held = false;
@@ -232,15 +230,15 @@ class Outcome {
     if (status?.run === 'running' && !await this.#order('pause')) {
       return false;
     }
-    while (this.#store.status?.run === 'running') {
+    while (this.#store.connected && this.#store.status?.run === 'running') {
       await new Promise((resolve) => {
-        const end = this.#store.on('status', () => {
+        const end = this.#store.on(['status', 'connection'], () => {
           end();
           resolve(undefined);
         });
       });
     }
-    return this.#store.epoch === epoch;
+    return this.#store.epoch === epoch && this.#store.status?.run !== 'running';
   }
 
   #card(facts: Card): Node[] {

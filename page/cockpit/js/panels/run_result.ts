@@ -31,6 +31,14 @@ export class RunResult {
       this.#files = files;
       changed();
     });
+    store.on('connection', (connected) => {
+      // The server may not have been there to ask.
+      for (const [run, { state }] of connected ? this.#scores : []) {
+        if (state === 'none') {
+          this.#scores.delete(run);
+        }
+      }
+    });
   }
 
   /** Remove the files of another program's run. */
