@@ -227,7 +227,7 @@ test('a run without a score says why', async () => {
   assert.equal(asked.length, 3);
 });
 
-test('a score that the server could not give is asked for again with a new connection', async () => {
+test('a score that a silent server did not give is asked for by a new connection', async () => {
   answer = null;
   end('duration');
   files();

@@ -26,7 +26,8 @@ test('the address can set everything; invalid values are ignored', () => {
     + '&change=1&fov=60&corner=top-left'), { seat: 'hv1', view: 'map', map: false,
     names: true, plans: true, sound: false, mirrors: false, change: true, fieldOfView_deg: 60,
     corner: 'top-left' });
-  assert.deepEqual(readStage('?stage=hv0&view=moon&map=no&names=yes&plans=2&fov=900&corner=no'), readStage('?stage=hv0'));
+  assert.deepEqual(readStage('?stage=hv0&view=moon&map=no&names=yes&plans=2&fov=900&corner=no'),
+  readStage('?stage=hv0'));
 });
 
 test('a stage is no side window', () => {
@@ -37,10 +38,10 @@ test('a stage is no side window', () => {
 test('the line has the language of the address, else of the game that is run', (t) => {
   t.mock.timers.enable({ apis: ['setInterval'] });
   const root = openPage('<div class="pedal-brake"><span class="bar-label"></span></div>');
-  window.crgame = { world: { stats: { frames: 0 } } };
+  globalThis.window.crgame = { world: { stats: { frames: 0 } } };
   const store = liveStore([]);
   const shown = (query) => {
-    window.location.search = query;
+    globalThis.window.location.search = query;
     createStage(root, store, new Server());
     store.receive({ type: 'seats', seats: {} });
     return [root.lastElementChild, document.querySelector('.bar-label')].map(textOf).concat(

@@ -4,6 +4,7 @@
 
 import { element, setAttribute, setText } from './dom.js';
 import { describeSeat } from './driving/seat_text.js';
+import { tellRefusal } from './rights.js';
 
 import type { Connection } from './connection.js';
 import type { RequestMessage, Seat } from './messages.js';
@@ -44,8 +45,7 @@ class Lobby {
 
   /** @returns the seat that this page holds */
   get #mine(): string | undefined {
-    const { me } = this.#store;
-    return this.#seats.find(([, { holder }]) => holder === me.id && me.id !== '')?.[0];
+    return this.#seats.find(([id]) => this.#store.holds(id))?.[0];
   }
 
   #show() {
@@ -89,11 +89,8 @@ class Lobby {
     }
   }
 
-  async #request(message: RequestMessage) {
-    const { ok, text } = await this.#connection.request(message);
-    if (!ok) {
-      this.#store.receive({ type: 'notice', level: 'warn', text });
-    }
+  #request(message: RequestMessage) {
+    return tellRefusal(this.#store, this.#connection.request(message));
   }
 }
 

@@ -6,6 +6,7 @@ import { element, setAttribute, setText } from './dom.js';
 import { oneLine } from './panels/format.js';
 import { session } from './panels/memory.js';
 import { post } from './panels/scenario_api.js';
+import { tellRefusal } from './rights.js';
 
 import type { Connection } from './connection.js';
 import type { DeviceDelay, Present } from './people_messages.js';
@@ -45,12 +46,10 @@ class People {
     element('h2', { id: 'people-title', text: 'People' }), this.#roleRow, this.#list,
     this.#invite);
     root.append(section);
-    for (const event of ['hello', 'you', 'people', 'scene'] as const) {
-      store.on(event, () => {
-        setAttribute(section, 'hidden', store.mode === 'replay');
-        this.#show();
-      });
-    }
+    store.on(['hello', 'you', 'people', 'scene'], () => {
+      setAttribute(section, 'hidden', store.mode === 'replay');
+      this.#show();
+    });
     store.on('hello', () => this.#chooseAgain());
     this.#chooseAgain();
     this.#show();
@@ -111,10 +110,8 @@ class People {
   }
 
   async #requestRole(role: RoleName) {
-    const { ok, text } = await this.#connection.request({ type: 'role', role });
-    if (!ok) {
+    if (!await tellRefusal(this.#store, this.#connection.request({ type: 'role', role }))) {
       this.#refused = role;
-      this.#store.receive({ type: 'notice', level: 'warn', text });
     }
   }
 

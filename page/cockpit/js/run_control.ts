@@ -6,7 +6,7 @@ import { element, part, setAttribute, setText } from './dom.js';
 import { isCommand } from './driving/focus.js';
 import { icon } from './driving/icons.js';
 import { confirm } from './panels/confirm.js';
-import { reasonAgainst, reasonAgainstOrder } from './rights.js';
+import { reasonAgainst, reasonAgainstOrder, tellRefusal } from './rights.js';
 
 import type { Connection } from './connection.js';
 import type { Recording, RequestMessage, RunAction, Status } from './messages.js';
@@ -123,11 +123,8 @@ class RunControl {
     }
   }
 
-  async #request(message: RequestMessage) {
-    const { ok, text } = await this.#connection.request(message);
-    if (!ok) {
-      this.#store.receive({ type: 'notice', level: 'warn', text });
-    }
+  #request(message: RequestMessage) {
+    return tellRefusal(this.#store, this.#connection.request(message));
   }
 
   #key(event: KeyboardEvent) {

@@ -5,7 +5,7 @@
 import { element, setAttribute, setText } from './dom.js';
 import { NameField } from './driving/name_field.js';
 import { describeSeat } from './driving/seat_text.js';
-import { reasonAgainstSeat } from './rights.js';
+import { reasonAgainstSeat, tellRefusal } from './rights.js';
 
 import type { Connection } from './connection.js';
 import type { Driving } from './driving/driving.js';
@@ -97,7 +97,7 @@ class Seats {
     const seat = seats[id];
     const role = scene?.vehicles.find((vehicle) => vehicle.id === id)?.role ?? 'human';
     return {
-      id, role, connected, mine: connected && seat.holder === me.id && me.id !== '',
+      id, role, connected, mine: connected && this.#store.holds(id),
       holder: seat.holder,
       // A seat that the game assigns to a cockpit cannot be given back to another driver.
       left: seat.holder === null && seat.source === 'cockpit' && seat.driver !== 'cockpit'
@@ -204,19 +204,15 @@ class Seats {
     return this.#connection.request(message);
   }
 
-  async #report(reply: Promise<Reply>) {
-    const { ok, text } = await reply;
-    if (!ok) {
-      this.#store.receive({ type: 'notice', level: 'warn', text });
-    }
+  #report(reply: Promise<Reply>) {
+    return tellRefusal(this.#store, reply);
   }
 
   #disconnected() {
     if (this.#stale) {
       return;
     }
-    const { seats, me } = this.#store;
-    const lost = Object.keys(seats).filter((id) => seats[id].holder === me.id && me.id !== '');
+    const lost = this.#store.own;
     this.#stale = true;
     this.#before = {};
     setText(this.#news, lost.length > 0

@@ -17,8 +17,8 @@ import type {
 import type { History } from './history.js';
 import type {
   Alarm, AlarmsMessage, EventsMessage, Exposure, FilesMessage, FiredEvent, HelloMessage, Measure,
-  NoticeMessage, Scene, SceneMessage, Seat, SeatsMessage, SignalsMessage, Status, StatusMessage,
-  StoreMessage,
+  NoticeMessage, RunState, Scene, SceneMessage, Seat, SeatsMessage, SignalsMessage, Status,
+  StatusMessage, StoreMessage,
 } from './messages.js';
 import type {
   DeviceDelay, PeopleMessage, Present, Rights, YouMessage,
@@ -54,6 +54,7 @@ export interface StoreEvents {
   events: EventsMessage;
   tasks: TasksMessage;
   status: StatusMessage;
+  run: RunState; // when it is another than in the status before
   alarms: AlarmsMessage;
   files: FilesMessage;
   notice: NoticeMessage;
@@ -143,6 +144,7 @@ export class Store {
    * @param message with its `type`
    */
   receive(message: StoreMessage) {
+    const before = this.status?.run;
     switch (message.type) {
       case 'hello':
         this.me = { id: message.client, name: message.name };
@@ -180,6 +182,9 @@ export class Store {
       default:
     }
     this.#emit(message.type, message);
+    if (message.type === 'status' && message.run !== before) {
+      this.#emit('run', message.run);
+    }
   }
 
   /**
@@ -314,6 +319,16 @@ export class Store {
       addToHistory(past, sample, index);
     }
     return past;
+  }
+
+  /** Return whether the person at this page drives a vehicle. */
+  holds(id: string): boolean {
+    return this.me.id !== '' && this.seats[id]?.holder === this.me.id;
+  }
+
+  /** Return the ids of the vehicles that the person at this page drives: one, save in between. */
+  get own(): string[] {
+    return Object.keys(this.seats).filter((id) => this.holds(id));
   }
 
   /**

@@ -4,7 +4,7 @@
 
 import { element, setAttribute, setText } from '../dom.js';
 import { isCommand } from '../driving/focus.js';
-import { reasonAgainstOrder } from '../rights.js';
+import { reasonAgainstOrder, tellRefusal } from '../rights.js';
 
 import type { Connection } from '../connection.js';
 import type { Store } from '../store.js';
@@ -34,12 +34,9 @@ export function createRestart(root: HTMLElement, store: Store,
     state.held = false;
     setAttribute(hint, 'hidden', true);
   };
-  const restart = async () => {
+  const restart = () => {
     end();
-    const { ok, text } = await connection.request({ type: 'control', action: 'reset' });
-    if (!ok) {
-      store.receive({ type: 'notice', level: 'warn', text });
-    }
+    tellRefusal(store, connection.request({ type: 'control', action: 'reset' }));
   };
   window.addEventListener('keydown', (event) => {
     if (event.code !== KEY || event.repeat || !isCommand(event)

@@ -35,8 +35,7 @@ class RunList {
     root.append(element('div', { class: 'stack' }, this.#compare, this.#error, this.#hint,
       this.#list));
     new MutationObserver(() => this.#seen()).observe(root, { attributeFilter: ['hidden'] });
-    store.on('files', () => this.#seen());
-    store.on('hello', () => this.#seen());
+    store.on(['files', 'hello'], () => this.#seen());
     this.#seen();
   }
 

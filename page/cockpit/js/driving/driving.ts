@@ -155,8 +155,7 @@ export class Driving {
   }
 
   #updateSeat() {
-    const { seats, me } = this.#store;
-    const mine = Object.keys(seats).filter((id) => seats[id].holder === me.id && me.id !== '');
+    const mine = this.#store.own;
     if (this.#store.mode !== 'live' || !this.#store.connected || mine.length === 0) {
       this.#leaveSeat();
     } else if (this.seat === null || !mine.includes(this.seat)) {
@@ -178,7 +177,7 @@ export class Driving {
 
   #leaveSeat() {
     if (this.seat !== null) {
-      if (this.#store.seats[this.seat]?.holder === this.#store.me.id) {
+      if (this.#store.holds(this.seat)) {
         this.#connection.send({ type: 'input', seat: this.seat, away: true });
       }
       this.#sender.seat = null;

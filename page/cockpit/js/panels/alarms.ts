@@ -88,17 +88,8 @@ export function createAlarms(root: HTMLElement, store: Store): { kinds: () => st
     paint(frame, signs, alarms);
     fitWords(root);
   };
-  let run = '';
-  store.on('alarms', update);
-  store.on('seats', update);
-  store.on('status', (status) => {
-    if (status.run !== run) {
-      run = status.run;
-      update();
-    }
-  });
+  store.on(['alarms', 'seats', 'run', 'connection'], update);
   window.addEventListener('resize', () => fitWords(root));
-  store.on('connection', update);
   update();
   // A page that has just been opened is given time to connect.
   setTimeout(() => {
@@ -112,12 +103,11 @@ export function createAlarms(root: HTMLElement, store: Store): { kinds: () => st
  * Return whether an alarm concerns the vehicle that this page drives or, without one, follows.
  * An alarm that is not about a vehicle concerns every page.
  */
-function concerns({ subject }: Alarm, { scene, seats, me }: Store) {
+function concerns({ subject }: Alarm, { scene, own }: Store) {
   if (!scene?.vehicles.some(({ id }) => id === subject)) {
     return true;
   }
-  const seat = Object.keys(seats).find((id) => me.id !== '' && seats[id].holder === me.id);
-  return subject === (seat ?? window.crgame?.world?.followed ?? subject);
+  return subject === (own[0] ?? window.crgame?.world?.followed ?? subject);
 }
 
 /** Return the page's own alarms: that the server has become silent. */

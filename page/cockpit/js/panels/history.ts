@@ -159,8 +159,7 @@ export class HistoryPanel {
   /** Select the vehicle that this page drives, or the first, until the user chooses. */
   #selectOwn() {
     const vehicles = this.#store.scene?.vehicles ?? [];
-    const own = vehicles.find(
-      (vehicle) => this.#store.seats[vehicle.id]?.holder === this.#store.me.id);
+    const own = vehicles.find(({ id }) => this.#store.holds(id));
     if (!this.#chosen && vehicles.length > 0 && (own || this.#selected.size === 0)) {
       this.#selected = new Set([(own ?? vehicles[0]).id]);
       this.#showChips();

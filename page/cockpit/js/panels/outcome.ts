@@ -4,7 +4,9 @@
 
 import { scoreBlock } from '../after/score.js';
 import { element, setAttribute } from '../dom.js';
-import { reasonAgainst, reasonAgainstOrder, reasonAgainstSeat } from '../rights.js';
+import {
+  reasonAgainst, reasonAgainstOrder, reasonAgainstSeat, tellRefusal,
+} from '../rights.js';
 import { confirm } from './confirm.js';
 import { clockTime, oneLine } from './format.js';
 import { icon } from './icons.js';
@@ -150,7 +152,7 @@ class Outcome {
       }
       return { phase: 'over', connected, against, ...this.#result.of(status, scene) };
     }
-    const mine = Object.keys(seats).find((id) => seats[id].holder === me.id) ?? null;
+    const mine = this.#store.own[0] ?? null;
     const mishaps = mine === null || !connected ? [] : mishapsOf(this.#store, mine);
     const last = mishaps.at(-1);
     if (this.#held && status.run === 'paused' && last !== undefined) {
@@ -338,12 +340,8 @@ class Outcome {
   }
 
   /** @returns whether it was done */
-  async #ask(reply: Promise<Reply>): Promise<boolean> {
-    const { ok, text } = await reply;
-    if (!ok) {
-      this.#store.receive({ type: 'notice', level: 'warn', text });
-    }
-    return ok;
+  #ask(reply: Promise<Reply>): Promise<boolean> {
+    return tellRefusal(this.#store, reply);
   }
 }
 

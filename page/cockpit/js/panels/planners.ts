@@ -72,8 +72,7 @@ export function createPlanners(root: HTMLElement, store: Store, connection: Conn
     update();
   };
   store.on('scene', rebuild);
-  store.on('status', update);
-  store.on('connection', update);
+  store.on(['status', 'connection'], update);
   new MutationObserver(update).observe(root, { attributeFilter: ['hidden'] });
   rebuild();
 }

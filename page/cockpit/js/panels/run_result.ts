@@ -51,11 +51,10 @@ export class RunResult {
     const over = status.run === 'ended';
     const files = over && this.#files?.epoch === status.epoch ? this.#files : null;
     const { timing } = status;
-    const { seats, me } = this.#store;
     return {
       scored: over ? this.#score(status, files)
         : { state: 'none', why: 'it is made when the run is over' },
-      mine: Object.keys(seats).find((id) => seats[id].holder === me.id) ?? null,
+      mine: this.#store.own[0] ?? null,
       why: why(status), stays: Boolean(status.stays), t: status.t,
       driven: scene.vehicles.length > 0,
       contacts: (status.contacts ?? []).map((item) => ({ ...item, part: part(item, files) })),

@@ -312,8 +312,7 @@ export function createScenario(root: HTMLElement, store: Store,
     }
   };
   new MutationObserver(seen).observe(root, { attributeFilter: ['hidden'] });
-  store.on('hello', seen);
-  store.on('you', seen);
+  store.on(['hello', 'you'], seen);
   seen();
   return panel;
 }

@@ -22,7 +22,6 @@ export function createTitle(root: HTMLElement, store: Store) {
     document.title = [title, store.mode === 'replay' ? 'replay' : '', PROGRAM]
       .filter((part, i, all) => part && all.indexOf(part) === i).join(' · ');
   };
-  store.on('scene', update);
-  store.on('hello', update);
+  store.on(['scene', 'hello'], update);
   update();
 }

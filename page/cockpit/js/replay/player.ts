@@ -45,8 +45,7 @@ export class Player {
         this.open();
       }
     };
-    store.on('hello', open);
-    store.on('connection', open);
+    store.on(['hello', 'connection'], open);
     // After a lost connection the server sends the scene of the run that it shows first.
     store.on('scene', (scene) => {
       if (this.info !== null && scene.time.epoch !== this.info.epoch) {

@@ -57,8 +57,7 @@ export class Stage {
     });
     store.on('epoch', () => { this.#before = this.#begun ? this.#pictures : NaN; });
     store.on('scene', () => this.#speak());
-    store.on('seats', () => this.#update());
-    store.on('connection', () => this.#update());
+    store.on(['seats', 'connection'], () => this.#update());
     this.#claimRole();
     setInterval(() => this.#update(), EVERY_MS);
   }
@@ -162,9 +161,8 @@ export class Stage {
    * was taken over in the run before: its planner starts the next run.
    */
   #leave() {
-    const { seats, me, connected } = this.#store;
-    const left = Object.keys(seats).find((id) => me.id !== '' && seats[id].holder === me.id
-      && (id !== this.address.seat || this.#staysBehind));
+    const { own, connected } = this.#store;
+    const left = own.find((id) => id !== this.address.seat || this.#staysBehind);
     if (connected && left !== undefined && performance.now() - this.#left_ms > CLAIM_EVERY_MS) {
       this.#left_ms = performance.now();
       if (left === this.address.seat) {

@@ -40,9 +40,7 @@ export class Tasks {
     this.#view.takeButton.addEventListener('click', () => this.#takeOver());
     store.on('scene', () => this.#begin());
     store.on('epoch', () => this.#forget());
-    store.on('tasks', () => this.#update());
-    store.on('seats', () => this.#update());
-    store.on('connection', () => this.#update());
+    store.on(['tasks', 'seats', 'connection'], () => this.#update());
     store.on('status', () => {
       this.#running.note(this.#runs, performance.now());
       this.#requestFrame();
@@ -113,9 +111,8 @@ export class Tasks {
    * drive.
    */
   #mayTake(seat: string) {
-    const { seats, me, rights } = this.#store;
-    const sits = Object.values(seats).some(({ holder }) => holder === me.id);
-    return !sits && rights.drives && me.id !== '' && seats[seat] !== undefined
+    const { own, seats, me, rights } = this.#store;
+    return own.length === 0 && rights.drives && me.id !== '' && seats[seat] !== undefined
       && !seats[seat].holder && (rights.seat === '' || rights.seat === seat);
   }
 

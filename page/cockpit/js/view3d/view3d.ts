@@ -68,9 +68,9 @@ export class View3d {
       window.addEventListener(name, (event) => this.#awaitAnswer(event), true);
     }
     new ResizeObserver(() => this.#resize()).observe(stage);
-    for (const name of ['scene', 'epoch', 'plan', 'state', 'signals'] as const) {
-      store.on(name, () => { this.#due = PICTURES_AFTER_CHANGE; });
-    }
+    store.on(['scene', 'epoch', 'plan', 'state', 'signals', 'events'], () => {
+      this.#due = PICTURES_AFTER_CHANGE;
+    });
     if (this.window !== null) {
       document.documentElement.classList.add('view-window');
       this.show(true);

@@ -147,7 +147,7 @@ export class VehicleLayer {
       drawLights(context, view, vehicle, shown.vehicles[row + VEHICLE.lights]);
     }
     const trouble = store.status?.drivability?.[vehicle.id];
-    if (trouble?.collision || store.seats[vehicle.id]?.holder === store.me.id) {
+    if (trouble?.collision || store.holds(vehicle.id)) {
       camera.enterPose(context, ratio, x, y, yaw, factor);
       context.strokeStyle = trouble?.collision ? palette.alarm : palette.label;
       context.lineWidth = (trouble?.collision ? 3.5 : 1.6) / (camera.scale * factor);

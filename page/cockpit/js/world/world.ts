@@ -23,8 +23,6 @@ import type { ChooseHollow, DrawnVehicle } from './vehicle_layer.js';
 const FRAMES_KEPT = 600;
 // A canvas whose height changes by more than this factor counts as a new map [-].
 const OTHER_SIZE = 1.6;
-const REDRAWN_ON = ['state', 'objects', 'plan', 'prediction', 'perception',
-  'signals', 'status', 'seats', 'events', 'epoch', 'hello'] as const;
 
 export interface Options {
   connection?: Connection | null; // receives the wanted layers
@@ -223,9 +221,8 @@ export class World {
     store.on('scene', (scene) => this.#load(scene));
     store.on('objects', (step) => this.#painter.vehicles.brakeLights.update(step));
     store.on('hello', () => this.#sendLayers());
-    for (const name of REDRAWN_ON) {
-      store.on(name, () => this.redraw());
-    }
+    store.on(['state', 'objects', 'plan', 'prediction', 'perception', 'signals', 'status', 'seats',
+      'events', 'epoch', 'hello'], () => this.redraw());
   }
 
   #resize(covered: HTMLElement | null) {
