@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { afterEach, beforeEach, mock, test } from 'node:test';
 
-import { createOutcome } from '../../page/cockpit/js/panels/outcome.js';
+import { Outcome } from '../../page/cockpit/js/panels/outcome.js';
 import { click, liveStore, openPage, Server, textOf } from './dom_support.mjs';
 
 const VEHICLES = [{ id: 'hv0', role: 'human' }, { id: 'av0', role: 'autonomous' }];
@@ -40,7 +40,7 @@ beforeEach(() => {
   latest = { run: 'running', n: 1, t: 30, epoch: 0, stays: true, contacts: [], departures: [],
     planners: {}, recording: { state: 'recorded' }, timing: null };
   store = liveStore(VEHICLES, { planners: { av0: 'idm' } });
-  createOutcome(root, store, server);
+  new Outcome(root, store, server);
 });
 
 afterEach(() => mock.restoreAll());

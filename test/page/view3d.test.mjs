@@ -121,7 +121,7 @@ test('a camera is mounted in the turned and climbing vehicle', () => {
 
 test('chase is behind the vehicle, bird above it', () => {
   const stand = { x: 0, y: 0, z: 0, yaw: 0, slope: 0 };
-  assert.ok(chasing(stand, { rear: -1, front: 3.5 }).x < -5);
+  assert.ok(chasing(stand, -1).x < -5);
   const bird = above(stand);
   assert.ok(bird.z > 30);
   near(bird.pitch, -Math.PI / 2, 1e-9);

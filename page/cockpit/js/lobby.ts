@@ -11,7 +11,7 @@ import type { RequestMessage, Seat } from './messages.js';
 import type { Store } from './store.js';
 
 /** The lobby in the Drive panel and the countdown on the stage. */
-class Lobby {
+export class Lobby {
   #store;
   #connection;
   #list = element('ul', { class: 'lobby-seats' });
@@ -92,9 +92,4 @@ class Lobby {
   #request(message: RequestMessage) {
     return tellRefusal(this.#store, this.#connection.request(message));
   }
-}
-
-/** Put the lobby into the Drive panel and the countdown over the picture. */
-export function createLobby(stage: HTMLElement, store: Store, connection: Connection): Lobby {
-  return new Lobby(stage, store, connection);
 }

@@ -19,7 +19,7 @@ const ROLES: [role: string, text: string][] = [['all', 'Director and driver'],
 const ROLE = 'crgame.role';
 
 /** The section of the Drive panel. */
-class People {
+export class People {
   #store;
   #connection;
   #list = element('ul', { class: 'people' });
@@ -139,13 +139,4 @@ function deviceRow({ seat, device, command_ms, input_delay_ms }: DeviceDelay) {
   return element('li', { 'data-device': seat }, element('strong', { text: oneLine(device) }),
     element('span', { text: `drives ${seat} at the machine of the game` }),
     element('span', { class: 'drive-note', text: delays }));
-}
-
-/**
- * Put the list of people into the Drive panel.
- *
- * @param root the panel
- */
-export function createPeople(root: HTMLElement, store: Store, connection: Connection): People {
-  return new People(root, store, connection);
 }

@@ -41,7 +41,7 @@ const RUN_TEXTS: Record<string, string> = {
 };
 
 /** The run control; one per page. */
-class RunControl {
+export class RunControl {
   #store;
   #connection;
   #buttons = {} as Record<RunAction, HTMLButtonElement>;
@@ -188,14 +188,4 @@ function recordingNow({ recording, run }: Status, connected: boolean): Recording
   }
   return run !== 'ended' ? { state: 'unknown' }
     : { ...told, state: told.state === 'recording' ? 'recorded' : told.state };
-}
-
-/**
- * Put the run control, the clock and the recording lamp into the header.
- *
- * @param root the header
- */
-export function createRunControl(root: HTMLElement, store: Store,
-  connection: Connection): RunControl {
-  return new RunControl(root, store, connection);
 }

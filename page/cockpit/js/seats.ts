@@ -31,7 +31,7 @@ export interface Facts {
 }
 
 /** The list of seats, with the name field above and the input devices below. */
-class Seats {
+export class Seats {
   #store;
   #connection;
   #driving;
@@ -240,14 +240,4 @@ class Seats {
       }
     }
   }
-}
-
-/**
- * Put the seats into the Drive panel.
- *
- * @param root the panel
- */
-export function createSeats(root: HTMLElement, store: Store, connection: Connection,
-  driving: Driving): Seats {
-  return new Seats(root, store, connection, driving);
 }

@@ -86,7 +86,6 @@ export class Store {
   rights: Rights = { role: '', directs: false, drives: false, seat: '', may_direct: false,
     may_drive: false };
   mode: HelloMessage['mode'] | null = null;
-  version = '';
   /** Origins of the only pages that may frame this one. */
   framedBy: string[] = [];
   connected = false;
@@ -149,7 +148,6 @@ export class Store {
       case 'hello':
         this.me = { id: message.client, name: message.name };
         this.mode = message.mode;
-        this.version = message.version;
         this.framedBy = (message.framed_by ?? '').split(' ').filter(Boolean);
         this.measures = message.measures ?? [];
         this.exposures = message.exposures ?? [];

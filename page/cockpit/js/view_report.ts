@@ -14,7 +14,7 @@ const SEND_EVERY_MS = 1000;
 const DEGREES = 180 / Math.PI;
 
 /** A periodic report of the view; in `window.crgame.viewReport`. */
-class ViewReport {
+export class ViewReport {
   #connection;
   #store;
   #stage;
@@ -93,14 +93,4 @@ class ViewReport {
     const { view3d, world } = window.crgame;
     return view3d?.on ? view3d.stats?.frames ?? 0 : world.stats.frames;
   }
-}
-
-/**
- * Report this page's view to the server.
- *
- * @param root the stage, which holds the picture
- */
-export function createViewReport(root: HTMLElement, store: Store,
-  connection: Connection): ViewReport {
-  return new ViewReport(root, store, connection);
 }

@@ -143,12 +143,3 @@ export class InstantReplay {
     this.#show();
   }
 }
-
-/**
- * Create the bar, closed.
- *
- * @param root #last-seconds
- */
-export function createInstantReplay(root: HTMLElement, store: Store): InstantReplay {
-  return new InstantReplay(root, store);
-}

@@ -16,7 +16,7 @@ const MOST_COMPARED = 6;
 const MEGA = 1e6;
 
 /** The list; one per page. */
-class RunList {
+export class RunList {
   #store;
   #root;
   #list = element('ul', { class: 'runs' });
@@ -187,13 +187,4 @@ function fileMenu({ id, files }: PastRun) {
 
 function button(action: string, text: string, act: () => void) {
   return element('button', { type: 'button', 'data-action': action, text, on: { click: act } });
-}
-
-/**
- * Create the panel, which fetches the list when it is shown.
- *
- * @param root #panel-runs
- */
-export function createRunList(root: HTMLElement, store: Store): RunList {
-  return new RunList(root, store);
 }

@@ -4,7 +4,7 @@
 
 import { part } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
-import { createSeats } from '../seats.js';
+import { Seats } from '../seats.js';
 import { CalibrationDialog } from './calibration.js';
 import { DevicePanel, shortName } from './device_panel.js';
 import { Focus } from './focus.js';
@@ -248,6 +248,6 @@ export class Driving {
 /** Put the instruments, the seats and the input devices into the page. */
 export function createDriving(root: HTMLElement, store: Store, connection: Connection): Driving {
   const driving = new Driving(root, store, connection);
-  createSeats(part(root, 'panel-drive'), store, connection, driving);
+  new Seats(part(root, 'panel-drive'), store, connection, driving);
   return driving;
 }

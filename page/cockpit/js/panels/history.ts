@@ -34,11 +34,6 @@ const THEME = [...COLOURS.human, ...COLOURS.autonomous, 'accent', 'border', 'tex
 
 /** The panel's parts and choices. */
 export class HistoryPanel {
-  /** Script time of the last redrawing of one plot [ms]. */
-  cost_ms = 0;
-  /** Redrawings so far. */
-  redrawn = 0;
-
   #root;
   #store;
   #quantities;
@@ -229,7 +224,6 @@ export class HistoryPanel {
       this.#due_ms = now_ms + PERIOD_MS;
       this.#redrawAll();
     }
-    const before_ms = performance.now();
     if (this.#waiting.length > 0 && this.#pasts === null) {
       this.#pasts = this.#gather();
       return;
@@ -237,8 +231,6 @@ export class HistoryPanel {
     const chart = this.#waiting.shift();
     if (chart !== undefined) {
       this.#draw(chart, this.#pasts ?? []);
-      this.cost_ms = performance.now() - before_ms;
-      this.redrawn += 1;
     }
   }
 

@@ -63,7 +63,7 @@ export type Facts = { phase: 'none'; run?: undefined } | { phase: 'closed' } | C
   | Ready | MishapFacts;
 
 /** The card; one per page. */
-class Outcome {
+export class Outcome {
   #root;
   #store;
   #connection;
@@ -352,13 +352,4 @@ function driverText({ seat, run, holder, holderName, me }: Awaiting) {
   }
   const whose = holder === me ? 'your hands are' : `the hands of ${oneLine(holderName)} are`;
   return `${seat} waits: ${whose} off the controls.`;
-}
-
-/**
- * Make the card.
- *
- * @param root #outcome
- */
-export function createOutcome(root: HTMLElement, store: Store, connection: Connection): Outcome {
-  return new Outcome(root, store, connection);
 }

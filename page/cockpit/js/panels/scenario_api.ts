@@ -45,13 +45,9 @@ export async function upload(file: File): Promise<string> {
   return reply.id;
 }
 
-/**
- * @param id of an upload
- * @returns what was done
- */
-export async function deleteUpload(id: string): Promise<string> {
-  const reply = await post<Reply>('/api/upload/delete', { id });
-  return oneLine(reply.text);
+/** @param id of an upload */
+export function deleteUpload(id: string): Promise<Reply> {
+  return post('/api/upload/delete', { id });
 }
 
 /**

@@ -54,13 +54,6 @@ export class ScenarioForm {
     this.root.replaceChildren(...nodes);
   }
 
-  /** Clear the form. */
-  clear() {
-    this.#rows.clear();
-    this.#options.clear();
-    this.root.replaceChildren();
-  }
-
   /** Return the choices: humans [{id, driver}], avs [{id, planner, options}]. */
   get choices() {
     const value = (id: string) => this.#rows.get(id)?.select.value ?? '';

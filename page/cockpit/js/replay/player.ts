@@ -279,12 +279,3 @@ export class Player {
     }
   }
 }
-
-/**
- * Create the player, which becomes visible when the page shows a recording.
- *
- * @param root footer#timeline
- */
-export function createReplay(root: HTMLElement, store: Store): Player {
-  return new Player(root, store);
-}

@@ -246,12 +246,3 @@ function recallShare(amount: Amount, usual: number) {
   const kept = Number.parseFloat(recall(amount));
   return kept >= 0 && kept <= 1 ? kept : usual;
 }
-
-/**
- * Put the sound's control into the header, and start the sound.
- *
- * @param root of the control
- */
-export function createSound(root: HTMLElement, store: Store, connection: Connection): Sound {
-  return new Sound(root, store, connection);
-}

@@ -29,11 +29,6 @@ export class RequestTone {
     window.addEventListener('pointerdown', begin, true);
   }
 
-  /** Return whether it sounds now. */
-  get sounds() {
-    return this.#sounding.length > 0;
-  }
-
   /** @param volume 0 to 1 */
   play(volume: number) {
     this.stop();

@@ -283,12 +283,3 @@ export class Tasks {
       what, ...known });
   }
 }
-
-/**
- * Show the tasks of the game to the driver at this page.
- *
- * @param root `#stage`
- */
-export function createTasks(root: HTMLElement, store: Store, connection: Connection): Tasks {
-  return new Tasks(root, store, connection);
-}

@@ -57,11 +57,10 @@ export function mountedAt(stand: Stand, point: Point, aside = 0, pitch = 0): Cam
 /**
  * Return a camera behind and above a vehicle.
  *
- * @param ends of the vehicle ahead of its rear axle [m]
+ * @param rear end of the vehicle, ahead of its rear axle [m]
  * @param aside how far it looks to the left of straight ahead [rad]
  */
-export function chasing(stand: Stand, { rear }: { front: number; rear: number },
-  aside = 0): CameraPose {
+export function chasing(stand: Stand, rear: number, aside = 0): CameraPose {
   const level = { ...stand, slope: 0.5 * stand.slope };
   return mountedAt(level, { x: rear - CHASE_BEHIND_M, y: 0, z: CHASE_ABOVE_M }, aside,
     CHASE_PITCH);

@@ -155,7 +155,7 @@ export class Picture {
     this.#renderer.info.reset();
     this.#aimMain(stand, vehicle, looks);
     const eye = this.#camera.position;
-    road.update(this.store, now_ms, { x: eye.x, y: eye.y, z: eye.z });
+    road.update(this.store, { x: eye.x, y: eye.y, z: eye.z });
     this.#traffic.byRole = !inside;
     this.#traffic.update(shown, vehicle.id, road.heightAt, eye);
     this.#plans.update(looks.plans, shown, this.#origin, road.heightAt);
@@ -218,7 +218,7 @@ export class Picture {
     const [x, y, z] = vehicle.driver_place.eye;
     const rear = vehicle.rear_to_center - 0.5 * vehicle.shape.length;
     const pose = viewpoint === 'driver' ? mountedAt(stand, { x, y, z }, aside)
-      : viewpoint === 'chase' ? chasing(stand, { rear, front: rear + vehicle.shape.length }, aside)
+      : viewpoint === 'chase' ? chasing(stand, rear, aside)
         : above(stand);
     this.#camera.fov = height * 180 / Math.PI;
     this.#camera.aspect = this.#size.width / this.#size.height;

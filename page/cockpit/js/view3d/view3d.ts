@@ -272,13 +272,3 @@ export class View3d {
     }
   }
 }
-
-/**
- * Put the 3D view beside the map.
- *
- * @param root the stage, which holds the map
- * @param store what is shown
- */
-export function createView3d(root: HTMLElement, store: Store, connection: Connection): View3d {
-  return new View3d(root, store, connection);
-}

@@ -225,8 +225,6 @@ export class Camera {
       ratio * this.toX(x, y), ratio * (this.toY(x, y) + down));
   }
 
-  /**
-   */
   #driverScale(speed = 0) {
     return Math.max(this.#free / (FOLLOW_HEIGHT + FOLLOW_TIME * speed), 2);
   }

@@ -34,8 +34,6 @@ export class MapLayer {
   #stops: Local[] = [];
   #goals: Local[] = [];
 
-  /** Whether the lanes' direction arrows are shown. */
-  arrows = true;
   /** Whether the AVs' goals are shown. */
   goals = true;
 
@@ -138,7 +136,7 @@ export class MapLayer {
       this.#strokeAll(context, view, 'broad', palette.mark, marks);
       this.#fillAll(context, view, 'zebras', palette.mark, marks);
     }
-    const arrows = this.arrows ? faded(camera.scale, ARROWS) : 0;
+    const arrows = faded(camera.scale, ARROWS);
     if (arrows > 0) {
       this.#fillAll(context, view, 'arrows', palette.arrow, arrows);
     }

@@ -23,7 +23,6 @@ export interface View {
   store: Store;
   scene: Scene | null;
   shown: Shown | null;
-  now_ms: number;
   insight: boolean; // whether plans, perception and goals of AVs may be drawn
 }
 
@@ -69,7 +68,6 @@ export class Painter {
       case 'plans': this.plans.on = on; break;
       case 'predictions': this.predictions.on = on; break;
       case 'goals': this.map.goals = on; break;
-      case 'arrows': this.map.arrows = on; break;
       case 'labels': this.labels.shown = on ? 'vehicles' : 'none'; break;
       case 'object_labels': this.labels.shown = on ? 'all' : 'vehicles'; break;
       default: {
@@ -86,7 +84,6 @@ export class Painter {
    * Paint one frame.
    *
    * @param context of the canvas
-   * @param view camera, palette, ratio, store, scene, shown, now_ms
    */
   paint(context: CanvasRenderingContext2D, view: View) {
     context.globalAlpha = 1;

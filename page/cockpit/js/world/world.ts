@@ -60,7 +60,7 @@ export class World {
    * @param canvas its parent gets the toolbar
    * @param store what is shown
    */
-  constructor(canvas: HTMLCanvasElement, store: Store, options: Options) {
+  constructor(canvas: HTMLCanvasElement, store: Store, options: Options = {}) {
     this.#canvas = canvas;
     this.#context = canvas.getContext('2d', { alpha: false }) as CanvasRenderingContext2D;
     this.#store = store;
@@ -69,7 +69,7 @@ export class World {
     this.#sight = options.sight ?? (() => null);
     this.#view = {
       camera: this.camera, palette: this.#palette, ratio: 1, store, scene: null, shown: null,
-      now_ms: 0, insight: true,
+      insight: true,
     };
     this.#attachHands(options);
     this.#attachSizes(options.covered ?? null);
@@ -125,7 +125,7 @@ export class World {
   /**
    * Show or hide a layer.
    *
-   * @param name plans, predictions, goals, arrows, labels or object_labels, or one that was added
+   * @param name plans, predictions, goals, labels or object_labels, or one that was added
    * @param on whether it is shown
    * @throws {RangeError} when there is no such layer
    */
@@ -305,7 +305,6 @@ export class World {
     this.#hideUnseen();
     this.#navigation.steer(this.#poseOf(this.followed), this.stats.frames > 1);
     this.camera.update(now_ms);
-    this.#view.now_ms = now_ms;
     this.#painter.paint(this.#context, this.#view);
     this.stats.frame_ms[this.stats.frames % FRAMES_KEPT] = performance.now() - begin_ms;
     this.stats.frames += 1;
@@ -318,16 +317,4 @@ function coverOf(canvas: HTMLElement, covered: HTMLElement | null): number {
     return 0;
   }
   return Math.max(canvas.getBoundingClientRect().bottom - covered.getBoundingClientRect().top, 0);
-}
-
-/**
- * Show a store's world on a canvas.
- *
- * @param canvas fills its parent
- * @param store what is shown
- * @returns draws from now on
- */
-export function createWorld(canvas: HTMLCanvasElement, store: Store,
-  options: Options = {}): World {
-  return new World(canvas, store, options);
 }
