@@ -10,6 +10,11 @@ export const LIGHT_BUTTONS = [
   'left_indicator', 'right_indicator', 'hazard', 'horn',
 ] as const;
 
+/** The lit lamps of a traffic light in each state. */
+export const LIT: Record<string, readonly string[] | undefined> = {
+  red: ['red'], redYellow: ['red', 'yellow'], yellow: ['yellow'], green: ['green'],
+};
+
 const BLINKS_PER_S = 1.5;
 const FLASHES_PER_S = 2;
 

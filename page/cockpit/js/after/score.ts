@@ -4,10 +4,10 @@
 
 import { element } from '../dom.js';
 import { fixed } from '../panels/format.js';
+import { KMH } from '../units.js';
 
 import type { Score, VehicleScore } from '../api_messages.js';
 
-const KMH = 3.6;
 
 /** The state of a score: being computed, the score, or why there is none. */
 export type Scored = { state: 'waiting' } | { state: 'told'; score: Score }

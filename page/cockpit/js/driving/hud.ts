@@ -4,6 +4,7 @@
 
 import { element, setAttribute, setText } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { DEGREES, KMH } from '../units.js';
 import { PedalBar, SteeringBar } from './gauges.js';
 import { Keycaps } from './keycaps.js';
 import { LightSigns } from './light_signs.js';
@@ -18,8 +19,6 @@ import type { Keyboard } from './keyboard.js';
 const NUMBERS_EVERY_MS = 100;
 const LIMIT_EVERY_MS = 300;
 const STANDSTILL = 0.05;
-const KMH = 3.6;
-const DEGREES = 180 / Math.PI;
 // Tolerance, so that rounding does not make a limit look exceeded [m/s].
 const LIMIT_TOLERANCE = 0.3;
 

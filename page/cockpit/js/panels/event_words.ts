@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Texts that describe an event of a game and the condition under which it fires. */
 
+import { KMH } from '../units.js';
 import { fixed, NONE } from './format.js';
 
 import type {
@@ -12,7 +13,6 @@ const THINGS: Record<string, string> = {
   constructionZone: 'a construction zone', parkedVehicle: 'a parked vehicle',
   roadBoundary: 'a barrier', unknown: 'an obstacle',
 };
-const KMH = 3.6;
 
 const ACTIONS: {
   [Kind in EventAction['kind']]: (event: Extract<EventAction, { kind: Kind }>) => string

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The poses of the 3D view's cameras, in the map's coordinates. */
 
-const DEGREE = Math.PI / 180;
+import { DEGREE } from '../units.js';
+
 const CHASE_BEHIND_M = 6.5;
 const CHASE_ABOVE_M = 3.4;
 const CHASE_PITCH = -12 * DEGREE;

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The field of view of a picture. */
 
-const DEGREE = Math.PI / 180;
+import { DEGREE } from '../units.js';
+
 /** Range of the angle across the picture [deg]. */
 export const FIELD_OF_VIEW = { least: 30, usual: 75, most: 140 };
 // At a larger angle, the roof over the driver's head would be nearer than the near plane.

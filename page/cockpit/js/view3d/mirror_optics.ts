@@ -2,10 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The optics of a mirror: a camera at the mirror image of the driver's eye. */
 
+import { DEGREE } from '../units.js';
+
 import type { DriverPlace } from '../messages.js';
 import type { Point } from './cameras.js';
 
-const DEGREE = Math.PI / 180;
 
 /** A mirror of a vehicle, convex like the side mirrors of cars. */
 export interface Mirror {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The three mirrors: each is drawn into its own picture, in turn, and laid over the view. */
 
+import { DEGREES } from '../units.js';
 import { mirrorCamera, MIRRORS } from './mirror_optics.js';
 
 import type { PerspectiveCamera, Scene as Scene3, WebGLRenderer } from 'three';
@@ -80,7 +81,7 @@ export class Mirrors {
         continue;
       }
       Object.assign(glass.camera, {
-        fov: glass.optics.height * 180 / Math.PI, aspect: glass.optics.aspect,
+        fov: glass.optics.height * DEGREES, aspect: glass.optics.aspect,
         near: glass.optics.near, far });
       glass.camera.updateProjectionMatrix();
     }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** One canvas on which three.js draws: the renderer, the world, the bodies and the cameras. */
 
+import { DEGREE, DEGREES } from '../units.js';
 import { above, chasing, mountedAt } from './cameras.js';
 import { createCabin } from './cabin.js';
 import { eyeOf, mirrorOf, seenBy } from './contents.js';
@@ -204,7 +205,7 @@ export class Picture {
     const forwards = this.#camera.getWorldDirection(new this.#three.Vector3());
     return {
       eye: eyeOf(stand, [x + this.#origin.x, y + this.#origin.y, z],
-        [forwards.x, forwards.y, forwards.z], fov * Math.PI / 180, aspect),
+        [forwards.x, forwards.y, forwards.z], fov * DEGREE, aspect),
       shown: [...glasses, ...seenBy(this.#sighting(this.#camera), things)],
     };
   }
@@ -220,7 +221,7 @@ export class Picture {
     const pose = viewpoint === 'driver' ? mountedAt(stand, { x, y, z }, aside)
       : viewpoint === 'chase' ? chasing(stand, rear, aside)
         : above(stand);
-    this.#camera.fov = height * 180 / Math.PI;
+    this.#camera.fov = height * DEGREES;
     this.#camera.aspect = this.#size.width / this.#size.height;
     this.#camera.updateProjectionMatrix();
     this.#aim(this.#camera, pose);

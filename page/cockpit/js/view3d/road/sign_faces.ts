@@ -7,6 +7,8 @@
  * common signs, and of TrafficSignIDUsa.
  */
 
+import { KMH } from '../../units.js';
+
 export type PlateShape = 'circle' | 'triangle' | 'yield' | 'octagon' | 'diamond' | 'square'
   | 'wide' | 'tall';
 
@@ -30,7 +32,6 @@ const blue = (symbol: string, text = ''): Face => (
 const wide = (style: Face['style'], text: string): Face => (
   { shape: 'wide', style, symbol: '', text });
 
-const KMH = 3.6;
 // Limits are multiples of this; files contain rounded values [km/h].
 const EVEN_KMH = 5;
 const NEARLY_KMH = 0.3;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Traffic lights: poles, housings, and lamps that show the signals of the run. */
 
+import { LIT } from '../../lights.js';
 import { geometryOf } from './materials.js';
 import { MeshParts } from './mesh_parts.js';
 import { NearInstances } from './near_instances.js';
@@ -21,11 +22,8 @@ import type { Three } from '../three.js';
 import type { Named } from '../contents.js';
 import type { Triple } from '../solid_boxes.js';
 
-/** Lamps from the top, and the lit ones of each state. */
-export const LAMPS = ['red', 'yellow', 'green'] as const;
-export const LIT: Record<string, readonly string[] | undefined> = {
-  red: ['red'], redYellow: ['red', 'yellow'], yellow: ['yellow'], green: ['green'],
-};
+/** Lamps from the top. */
+const LAMPS = ['red', 'yellow', 'green'] as const;
 const COLORS = { red: 0xff3b2c, yellow: 0xffc21f, green: 0x1fe08a };
 const OFF = 0x24272b;
 /** Middle of the lowest lamp above the road [m]. */
