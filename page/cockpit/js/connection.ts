@@ -40,12 +40,7 @@ export class Connection {
     return this.#socket?.readyState === WebSocket.OPEN;
   }
 
-  /**
-   * Send a message that needs no answer.
-   *
-   * @param message with its `type`
-   * @returns false when there is no connection
-   */
+  /** Send a message that needs no answer; return false when there is no connection. */
   send(message: PageMessage): boolean {
     if (!this.open) {
       return false;
@@ -56,7 +51,6 @@ export class Connection {
 
   /**
    * Send a message and wait for the server's reply.
-   *
    * @param message with its `type`; gets its `id` here
    * @returns never rejects
    */
@@ -148,7 +142,6 @@ export class Connection {
 
 /**
  * Return the socket's address beside a page's: a replay has an address below the cockpit's.
- *
  * @param location of the page
  */
 function socketUrl(location: Location) {

@@ -46,12 +46,7 @@ export class DisplayClock {
     this.#shown = NaN;
   }
 
-  /**
-   * Record the arrival of a sample.
-   *
-   * @param t its simulation time [s]
-   * @param now_ms when it arrived
-   */
+  /** Record the arrival of a sample; `t`: its simulation time [s]; `now_ms`: when it arrived. */
   arrived(t: number, now_ms: number) {
     const last = (this.#next + WINDOW - 1) % WINDOW;
     if (this.#count > 0 && (now_ms - this.#at[last] > SILENCE_MS || t <= this.#t[last])) {
@@ -67,7 +62,6 @@ export class DisplayClock {
 
   /**
    * Return the simulation time to show.
-   *
    * @param now_ms wall time of the frame, which never goes back
    * @param newest_t of the newest sample [s]
    * @param runs false while the simulation stands still

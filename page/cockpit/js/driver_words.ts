@@ -42,7 +42,6 @@ export const WORDS: Record<Language, Words> = Object.freeze({
 
 /**
  * Choose the language of a page.
- *
  * @param search query of the address, whose `lang` may name a language
  * @param ofGame language of the game
  */
@@ -56,7 +55,6 @@ export function languageOf(search: string, ofGame: string | undefined): Language
 
 /**
  * Read the labels of tasks in a page's address, in the driver's language.
- *
  * @param search query of the address, whose `labels` may be JSON of texts by the task's name
  */
 export function labelsOf(search: string): Map<string, string> {

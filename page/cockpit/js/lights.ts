@@ -20,7 +20,6 @@ const FLASHES_PER_S = 2;
 
 /**
  * Return the lights that are lit at a time: some blink in simulation time.
- *
  * @param lights bits; undefined means none
  * @param t simulation time [s]
  */

@@ -7,7 +7,6 @@ import type { Store } from './store.js';
 
 /**
  * Return why an action is not allowed here; the server checks it too.
- *
  * @param right that it needs
  * @param deed as in 'reset the run'
  * @returns empty if it may be done
@@ -22,7 +21,6 @@ export function reasonAgainst(store: Store, right: 'direct' | 'drive', deed: str
 
 /**
  * Return why an order is not allowed; a driver in the seat uses start to report ready.
- *
  * @returns empty if it can
  */
 export function reasonAgainstOrder(store: Store, action: RunAction): string {
@@ -35,7 +33,6 @@ export function reasonAgainstOrder(store: Store, action: RunAction): string {
 
 /**
  * Return why this person cannot act on a seat.
- *
  * @param id of a seat that there is
  * @returns empty if they can
  */

@@ -30,10 +30,7 @@ export class SampleRing<Sample extends { n: number; t: number }> {
     return this.at(this.#length - 1);
   }
 
-  /**
-   * @param index 0 is the oldest
-   * @returns the sample
-   */
+  /** Return a sample; 0 is the oldest. */
   at(index: number): Sample | undefined {
     return index < 0 || index >= this.#length ? undefined
       : this.#items[(this.#start + index) % this.#items.length];
@@ -41,7 +38,6 @@ export class SampleRing<Sample extends { n: number; t: number }> {
 
   /**
    * Add a sample; one of the newest sample's step replaces it.
-   *
    * @param sample with n and t
    * @returns false for a sample that is too old or too close
    */
@@ -74,7 +70,6 @@ export class SampleRing<Sample extends { n: number; t: number }> {
 
   /**
    * Find the last sample at or before a time.
-   *
    * @param t simulation time [s]
    * @returns its index, -1 when all are later
    */

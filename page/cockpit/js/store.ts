@@ -123,7 +123,6 @@ export class Store {
 
   /**
    * Listen to one or several events.
-   *
    * @param listener called after the store has stored the content
    * @returns ends it
    */
@@ -137,11 +136,7 @@ export class Store {
     return () => sets.forEach((listeners) => listeners.delete(listener));
   }
 
-  /**
-   * Store a document or an event of the server.
-   *
-   * @param message with its `type`
-   */
+  /** Store a document or an event of the server. */
   receive(message: StoreMessage) {
     const before = this.status?.run;
     switch (message.type) {
@@ -185,12 +180,7 @@ export class Store {
     }
   }
 
-  /**
-   * Store a binary frame; one of an earlier epoch is dropped.
-   *
-   * @param buffer the frame
-   * @param now_ms when it arrived
-   */
+  /** Store a binary frame; one of an earlier epoch is dropped; `now_ms`: when it arrived. */
   receiveFrame(buffer: ArrayBuffer, now_ms: number) {
     const frame = decodeFrame(buffer);
     if (frame === null || (frame.epoch < this.epoch && !this.#fresh)) {
@@ -220,11 +210,7 @@ export class Store {
     }
   }
 
-  /**
-   * Remove all samples, for a reset or a jump of a replay.
-   *
-   * @param epoch of the frames to come
-   */
+  /** Remove all samples, for a reset or a jump of a replay; `epoch` of the frames to come. */
   restart(epoch: number) {
     this.epoch = epoch;
     this.samples.clear();
@@ -250,7 +236,6 @@ export class Store {
 
   /**
    * Show the times of a function instead of those of the live clock.
-   *
    * @param source wall time [ms] -> simulation time [s]
    */
   useTimeSource(source: ((now_ms: number) => number) | null) {
@@ -260,7 +245,6 @@ export class Store {
 
   /**
    * Get the past of vehicles from a function instead of the received samples.
-   *
    * @param source as `history`
    */
   useHistorySource(source: HistorySource | null) {
@@ -277,7 +261,6 @@ export class Store {
    *
    * Vehicles are interpolated linearly in t between the samples around t, or extrapolated from the
    * newest if it is late; objects are at pose + velocity * (t - t of their step).
-   *
    * @param now_ms the frame's time, as requestAnimationFrame gives it
    * @returns the same object each time, refilled; null before any sample
    */
@@ -302,7 +285,6 @@ export class Store {
 
   /**
    * Return a vehicle's past for plots.
-   *
    * @param index of the vehicle in the scene
    * @param seconds how far back, at most 120 s
    */
@@ -329,10 +311,7 @@ export class Store {
     return Object.keys(this.seats).filter((id) => this.holds(id));
   }
 
-  /**
-   * @param id of a vehicle
-   * @returns its index in the scene and in STATE, -1 when there is none
-   */
+  /** Return a vehicle's index in the scene and in STATE, -1 when there is none. */
   vehicleIndex(id: string): number {
     return this.scene === null ? -1 : this.scene.vehicles.findIndex((v) => v.id === id);
   }

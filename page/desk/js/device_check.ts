@@ -28,7 +28,6 @@ const KEYBOARD = 'keyboard';
 
 /**
  * Return this browser's stored calibrations for the stage, whose address has another port.
- *
  * @returns JSON of a profile, by the device's name
  */
 export function calibrations(): Record<string, string> {

@@ -8,11 +8,7 @@ import type { SliderQuestion } from './desk_messages.js';
 import type { Controls } from './question_view.js';
 import type { Words } from './words.js';
 
-/**
- * Build the controls of a slider question.
- *
- * @param id of its input
- */
+/** Build the controls of a slider question; `id` of its input. */
 export function sliderControls({ low, high, step, bare, left, right }: SliderQuestion,
   words: Words, id: string, changed: () => void): Controls {
   const input = element('input', { id, type: 'range', min: low, max: high, step,

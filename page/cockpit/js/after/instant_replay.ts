@@ -27,10 +27,7 @@ export class InstantReplay {
   #play;
   #slider;
 
-  /**
-   * @param root of the bar
-   * @param store its samples are shown
-   */
+  /** `root` of the bar; `store`: its samples are shown. */
   constructor(root: HTMLElement, store: Store) {
     this.#root = root;
     this.#store = store;

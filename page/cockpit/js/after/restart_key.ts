@@ -16,12 +16,7 @@ const SHOWN_AFTER_MS = 250;
 const KEY = 'KeyR';
 const HINT = 'Hold R to begin anew';
 
-/**
- * Listen to the key.
- *
- * @param root gets the hint
- * @returns held: whether the key is down and counts
- */
+/** Listen to the key, which counts while `held`; `root` gets the hint. */
 export function createRestart(root: HTMLElement, store: Store,
   connection: Connection): { held: boolean } {
   const state = { held: false };

@@ -28,10 +28,7 @@ export const pictureAddress = (id: string) => `/api/runs/picture?id=${encodeURIC
 /** @param id of a run */
 export const zipAddress = (id: string) => `/api/runs/zip?id=${encodeURIComponent(id)}`;
 
-/**
- * @param id of a run
- * @param name of one of its files
- */
+/** `id` of a run; `name` of one of its files. */
 export const fileAddress = (id: string, name: string) => (
   `/api/runs/file?id=${encodeURIComponent(id)}&file=${encodeURIComponent(name)}`);
 

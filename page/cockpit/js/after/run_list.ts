@@ -50,7 +50,6 @@ export class RunList {
 
   /**
    * Fetch the list of runs from the server.
-   *
    * @param refusal of an order, to be told meanwhile and with the new list
    */
   async refresh(refusal = '') {

@@ -13,11 +13,7 @@ import type { Score, VehicleScore } from '../api_messages.js';
 export type Scored = { state: 'waiting' } | { state: 'told'; score: Score }
   | { state: 'none'; why: string };
 
-/**
- * Build the table of scores.
- *
- * @param mine the vehicle that this page drives, shown first
- */
+/** Build the table of scores; `mine`: the vehicle that this page drives, shown first. */
 export function scoreBlock(scored: Scored, mine: string | null): HTMLElement {
   const root = element('section', { class: 'score', 'aria-label': 'Score',
     'data-state': scored.state });

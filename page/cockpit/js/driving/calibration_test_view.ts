@@ -39,11 +39,7 @@ export class CalibrationTest {
       this.#tuning);
   }
 
-  /**
-   * Show the effect of a sample.
-   *
-   * @param profile null hides this view
-   */
+  /** Show the effect of a sample; `profile`: null hides this view. */
   show(profile: Profile | null, sample?: Sample) {
     setAttribute(this.node, 'hidden', profile === null);
     if (profile !== this.#profile) {

@@ -30,10 +30,7 @@ export class Focus {
    */
   reason;
 
-  /**
-   * @param store its `connected` counts
-   * @param changed called at once at each change of `reason`
-   */
+  /** `store`: its `connected` counts; `changed` called at once at each change of `reason`. */
   constructor(store: Store, changed: (reason: string | null) => void) {
     this.#store = store;
     this.#changed = changed;

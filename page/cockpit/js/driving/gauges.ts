@@ -13,10 +13,7 @@ export class PedalBar {
   #value;
   node;
 
-  /**
-   * @param kind 'throttle' or 'brake'
-   * @param label under the bar
-   */
+  /** `kind`: 'throttle' or 'brake'; `label` under the bar. */
   constructor(kind: string, label: string) {
     this.#fill = element('div', { class: 'bar-fill' });
     this.#key = element('div', { class: 'bar-key' });
@@ -28,7 +25,6 @@ export class PedalBar {
 
   /**
    * Show the bar and the outline of its key.
-   *
    * @param command 0 to 1, NaN if no command is in force
    * @param key whether its key is held
    */
@@ -60,7 +56,6 @@ export class SteeringBar {
 
   /**
    * Show the bar and the outlines of its keys.
-   *
    * @param command -1 (right) to 1 (left), NaN if no command is in force
    * @param left whether a left key is held
    * @param right whether a right key is held

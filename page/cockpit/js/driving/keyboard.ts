@@ -66,30 +66,19 @@ export class Keyboard {
     return this.keys.includes(1);
   }
 
-  /**
-   * @param code place of a key, such as 'KeyW'
-   * @returns whether it is held
-   */
+  /** Return whether a key is held; `code`: its place, such as 'KeyW'. */
   isHeld(code: string): boolean {
     return this.#held.has(code);
   }
 
-  /**
-   * Press a key by touch.
-   *
-   * @param code place of a key
-   */
+  /** Press a key by touch; `code`: place of a key. */
   press(code: string) {
     if (this.#enabled()) {
       this.#press(code, performance.now());
     }
   }
 
-  /**
-   * Release a key that `press` has pressed.
-   *
-   * @param code place of a key
-   */
+  /** Release a key that `press` has pressed; `code`: place of a key. */
   lift(code: string) {
     this.#leave(code, performance.now());
   }

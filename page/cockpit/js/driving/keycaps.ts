@@ -44,11 +44,7 @@ export class Keycaps {
     this.#readLayout();
   }
 
-  /**
-   * Light the held keys.
-   *
-   * @param reverse whether the reverse gear is requested
-   */
+  /** Light the held keys; `reverse`: whether the reverse gear is requested. */
   show(keyboard: Keyboard, reverse: boolean) {
     for (const [code, , twin] of CAPS) {
       const on = code === 'KeyR' ? reverse

@@ -20,12 +20,7 @@ export class LightSigns {
     this.node = element('div', { class: 'hud-lights' }, ...this.#signs.map(({ node }) => node));
   }
 
-  /**
-   * Update the signs.
-   *
-   * @param lights as the vehicle's state has them
-   * @param t simulation time [s]
-   */
+  /** Update the signs; `lights` as the vehicle's state has them; `t`: simulation time [s]. */
   show(lights: number, t: number) {
     const shines = shining(lights, t);
     for (const { name, title, node } of this.#signs) {

@@ -23,7 +23,6 @@ export class PutBackNotice {
 
   /**
    * Update with the driver's input; holding the control requests once.
-   *
    * @param asked whether the driver requests to be put back
    */
   update(seat: string | null, asked: boolean) {

@@ -24,11 +24,7 @@ export class RawBars {
         element('span', { class: 'bar-label', text: 'Buttons' }), ...buttons));
   }
 
-  /**
-   * Show a sample.
-   *
-   * @param found the moved control, which is marked
-   */
+  /** Show a sample; `found`: the moved control, which is marked. */
   show(sample: Sample, found: Place | null) {
     this.#showAll('axis', sample.axes, found);
     this.#showAll('button', sample.buttons, found);

@@ -52,7 +52,6 @@ export class SpeedLimits {
   /**
    * Return the limit of the lane under a vehicle; at a crossing, of the lane that fits its
    * heading.
-   *
    * @param x of the vehicle [m]
    * @param y of the vehicle [m]
    * @param yaw of the vehicle [rad]

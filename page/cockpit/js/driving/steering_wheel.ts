@@ -23,11 +23,7 @@ export class SteeringWheel {
     }, this.#turning);
   }
 
-  /**
-   * Turn the wheel.
-   *
-   * @param steering -1 (right) to 1 (left)
-   */
+  /** Turn the wheel; `steering`: -1 (right) to 1 (left). */
   turn(steering: number) {
     const angle = Number.isFinite(steering) ? -steering * FULL_LOCK_DEG : 0;
     setAttribute(this.#turning, 'transform', `rotate(${angle.toFixed(1)})`);

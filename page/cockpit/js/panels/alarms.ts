@@ -37,12 +37,7 @@ export interface Shown extends Alarm, Chip {
   mine: boolean;
 }
 
-/**
- * Show the alarms.
- *
- * @param root #alarms in the header
- * @returns kinds: those on the page now
- */
+/** Show the alarms; return the `kinds` on the page now; `root`: #alarms in the header. */
 export function createAlarms(root: HTMLElement, store: Store): { kinds: () => string[] } {
   const frame = part(document.body, 'alarm-frame');
   const signs = part(document.body, 'alarm-signs');

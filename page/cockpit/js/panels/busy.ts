@@ -22,7 +22,6 @@ export class Busy {
 
   /**
    * Start, or change the text; the seconds count from the first call.
-   *
    * @param words what is being done
    */
   describe(words: string) {

@@ -40,11 +40,7 @@ function escaped(text: string) {
   return text.replaceAll('&', '&amp;').replaceAll('<', '&lt;').replaceAll('>', '&gt;');
 }
 
-/**
- * Convert a picture to pixels.
- *
- * @returns PNG
- */
+/** Convert a picture to pixels; return PNG. */
 export async function rasterised({ text, width, height }: Picture): Promise<Blob> {
   const address = URL.createObjectURL(new Blob([text], { type: 'image/svg+xml' }));
   try {

@@ -38,10 +38,7 @@ const TITLES: Record<EventAction['kind'], string> = {
   planner_run: 'Planner stop or go',
 };
 
-/**
- * @param event an entry of scene.events
- * @returns its kind in words
- */
+/** Return the kind of an entry of scene.events in words. */
 export function eventKind(event: GameEvent): string {
   return Object.hasOwn(TITLES, event.kind) ? TITLES[event.kind]
     : String(event.kind ?? '').replaceAll('_', ' ');

@@ -15,12 +15,7 @@ import type { Store } from '../store.js';
 const BY = new Map([['trigger', 'by button'], ['condition', 'by its condition'],
   ['driver', 'by its driver'], ['contact', 'stopped by it']]);
 
-/**
- * Make the panel.
- *
- * @param root #panel-events
- * @returns trigger an event by its name
- */
+/** Make the panel; return what triggers an event by its name. */
 export function createEvents(root: HTMLElement, store: Store,
   connection: Connection): { trigger: (name: string) => Promise<void> } {
   const log = element('ol', { class: 'event-log' });

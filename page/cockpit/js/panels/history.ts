@@ -60,10 +60,7 @@ export class HistoryPanel {
   #hint = element('p', { class: 'hint', text: 'Loading the plots …' });
   #body = element('div', { class: 'charts' });
 
-  /**
-   * @param root in a panel, or the panel
-   * @param quantities that are plotted
-   */
+  /** `root` in a panel, or the panel; `quantities` that are plotted. */
   constructor(root: HTMLElement, store: Store, quantities: Quantity[]) {
     this.#root = root;
     this.#store = store;
@@ -126,10 +123,7 @@ export class HistoryPanel {
     this.#redrawAll();
   }
 
-  /**
-   * @param id of a vehicle
-   * @param on whether it is plotted
-   */
+  /** `id` of a vehicle; `on`: whether it is plotted. */
   select(id: string, on: boolean) {
     if (on) {
       this.#selected.add(id);
@@ -318,11 +312,7 @@ function childrenOf(root: HTMLElement): HTMLElement[] {
   return [...root.children] as HTMLElement[];
 }
 
-/**
- * Make the panel.
- *
- * @param root #panel-history
- */
+/** Make the panel. */
 export function createHistory(root: HTMLElement, store: Store): HistoryPanel {
   return new HistoryPanel(root, store, QUANTITIES);
 }

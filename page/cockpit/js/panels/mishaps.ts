@@ -10,7 +10,6 @@ export interface Mishap { t: number; touched: boolean; text: string }
 
 /**
  * Return the contacts and road departures of a vehicle, in the order of time.
- *
  * @param mine the vehicle
  */
 export function mishapsOf({ status }: Store, mine: string): Mishap[] {

@@ -95,11 +95,7 @@ export const QUANTITIES: Quantity[] = [
   { key: 'latency', title: 'Plan latency', unit: 'ms', digits: 0, lines: [{ latency: true }] },
 ];
 
-/**
- * Make the lines of a quantity.
- *
- * @param data of the vehicles that are selected
- */
+/** Make the lines of a quantity; `data` of the vehicles that are selected. */
 export function traces(quantity: Quantity, data: PlotData, view: PlotWindow): Trace[] {
   return quantity.lines.flatMap((line, i) => {
     if ('health' in line) {

@@ -14,11 +14,7 @@ import type { Store } from '../store.js';
 
 const DOWN = 'M12 4v11M7 10l5 5 5-5M4 17v3h16v-3';
 
-/**
- * Put the buttons into the panels and on the map.
- *
- * @param root #panels
- */
+/** Put the buttons into the panels and on the map. */
 export function createSaving(root: HTMLElement,
   store: Store): { savePlots: (panel: string, format: string) => Promise<void> } {
   const savePlots = async (name: string, format: string) => {

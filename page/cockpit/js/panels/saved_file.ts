@@ -19,11 +19,7 @@ function cell(value: string | number) {
   return /[",\r\n]/.test(safe) ? `"${safe.replaceAll('"', '""')}"` : safe;
 }
 
-/**
- * Read the rows of a table on the page.
- *
- * @param table or a list of terms
- */
+/** Read the rows of a table, or of a list of terms, on the page. */
 export function rowsOf(table: HTMLElement): string[][] {
   return [...table.querySelectorAll('tr')].map((row) => (
     [...row.querySelectorAll('th, td')].map((node) => (node.textContent ?? '').trim())));

@@ -288,11 +288,7 @@ function wrongFiles(files: File[]) {
   return file.size > LARGEST_FILE ? `${file.name} is larger than 64 MB.` : '';
 }
 
-/**
- * Create the panel, which fetches its list when it is first shown.
- *
- * @param root #panel-scenario
- */
+/** Create the panel, which fetches its list when it is first shown. */
 export function createScenario(root: HTMLElement, store: Store,
   connection: Connection): ScenarioPanel {
   const replay = element('p', {

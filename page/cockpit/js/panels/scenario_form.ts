@@ -68,7 +68,6 @@ export class ScenarioForm {
 
   /**
    * Show an error beside the vehicle that it names.
-   *
    * @param text the error; empty removes all
    * @returns false if it names no vehicle here
    */

@@ -9,11 +9,7 @@ import type { Store } from '../store.js';
 
 const PROGRAM = 'crgame';
 
-/**
- * Keep the title up to date.
- *
- * @param root #title
- */
+/** Keep the title up to date. */
 export function createTitle(root: HTMLElement, store: Store) {
   const update = () => {
     const title = isolated(store.scene?.title || PROGRAM);

@@ -22,8 +22,6 @@ export class EstimateLayer {
 
   /**
    * Draw the estimate.
-   *
-   * @param context of the world
    * @param view as layers get it
    * @param vehicle of the vehicle layer, that of the AV
    * @param av its index; -1 draws nothing
@@ -63,11 +61,7 @@ export class EstimateLayer {
   }
 }
 
-/**
- * Return the ellipse of two standard deviations of a covariance.
- *
- * @param covariance [m^2]
- */
+/** Return the ellipse of two standard deviations of a covariance; `covariance` [m^2]. */
 export function ellipse({ xx, xy, yy }: { xx: number; xy: number; yy: number }): Ellipse {
   const mean = (xx + yy) / 2;
   const spread = Math.hypot((xx - yy) / 2, xy);

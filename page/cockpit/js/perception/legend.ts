@@ -36,7 +36,6 @@ export class Legend {
 
   /**
    * Show the entries of the layers on the map.
-   *
    * @param names of the layers
    * @param av id of the AV that is followed
    * @param known whether it is known what it sees

@@ -26,12 +26,7 @@ export class OccupancyLayer {
   #color = '';
   #levels: Level[] = [];
 
-  /**
-   * Draw the map.
-   *
-   * @param context of the world
-   * @param view as layers get it
-   */
+  /** Draw the map; `view` as layers get it. */
   draw(context: CanvasRenderingContext2D, { camera, palette, ratio, store }: View) {
     const map = store.perceived.occupancy;
     if (map === null) {

@@ -97,11 +97,7 @@ class Perception {
     return this.#shows('occupancy') ? this.#occupancy.drawn : 0;
   }
 
-  /**
-   * Return how many of the near objects the followed AV sees.
-   *
-   * @returns null unless it perceives
-   */
+  /** Return how many of the near objects the followed AV sees: null unless it perceives. */
   get count(): { seen: number; near: number; range: number | null } | null {
     const { shown } = this.#world;
     const av = this.#av();
@@ -113,7 +109,6 @@ class Perception {
 
   /**
    * Show or hide a layer, and remember it.
-   *
    * @param name unseen, rays, estimate or occupancy
    * @param on whether it is shown
    */
@@ -224,11 +219,7 @@ class Perception {
   }
 }
 
-/**
- * Put the layers of perception on the world.
- *
- * @param stage that holds the canvas
- */
+/** Put the layers of perception on the world; `stage` that holds the canvas. */
 export function createPerception(stage: HTMLElement, store: Store,
   connection: Connection): Perception {
   return new Perception(stage, store, connection, window.crgame.world);

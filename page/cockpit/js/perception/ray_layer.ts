@@ -27,8 +27,6 @@ export class RayLayer {
 
   /**
    * Draw the scans of an AV at the poses of their sensors at the time of the scan.
-   *
-   * @param context of the world
    * @param view as layers get it
    * @param av index of the AV; -1 draws nothing
    */

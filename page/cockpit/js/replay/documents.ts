@@ -43,7 +43,6 @@ export class ReplayDocuments {
 
   /**
    * Set the documents that are valid at a time.
-   *
    * @param now_ms wall time
    * @param jumped whether the time has jumped
    */

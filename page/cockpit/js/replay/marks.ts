@@ -26,7 +26,6 @@ const OTHER: [shape: string, word: string] = ['M4 0H8V12H4Z', ''];
 
 /**
  * Return the text of an event.
- *
  * @param event of the replay's info
  * @returns kind, subject, text, count and time
  */
@@ -39,7 +38,6 @@ export function eventText({ kind, subject, text, count, t }: ReplayMark): string
 
 /**
  * Draw the mark of an event.
- *
  * @param event of the replay's info
  * @param share where on the time line, 0 to 1
  * @param chosen called when it is clicked

@@ -21,10 +21,7 @@ export class Horn {
     this.#out = out;
   }
 
-  /**
-   * @param doppler by which the notes are shifted
-   * @param when time of the context [s]
-   */
+  /** `doppler` by which the notes are shifted; `when`: time of the context [s]. */
   update(on: boolean, doppler: number, when: number) {
     if (on && this.#sounding === null) {
       this.#sounding = this.#begin(doppler, when);

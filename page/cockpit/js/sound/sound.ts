@@ -115,7 +115,6 @@ export class Sound {
 
   /**
    * Choose for this page only: the browser does not remember it, and M has no effect.
-   *
    * @param on starts with the next key, click or button of a gamepad
    */
   want(on: boolean) {

@@ -11,10 +11,7 @@ export class FrameLink {
   #told = '';
   #heard = '';
 
-  /**
-   * @param store whose `framedBy` has the origins
-   * @param ordered called for each order of that page
-   */
+  /** `store` whose `framedBy` has the origins; `ordered` called for each order of that page. */
   constructor(store: Store, ordered: (order: StageOrder) => void) {
     this.#store = store;
     window.addEventListener('message', ({ source, origin, data }) => {

@@ -292,7 +292,6 @@ export class Stage {
 
 /**
  * Make the page a stage.
- *
  * @throws {Error} if the address is not one of a stage
  */
 export function createStage(root: HTMLElement, store: Store, connection: Connection): Stage {

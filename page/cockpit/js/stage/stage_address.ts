@@ -25,7 +25,6 @@ export interface StageAddress {
 
 /**
  * Read a page's address.
- *
  * @param query `?stage=hv0&view=driver&map=1&names=0&plans=0&sound=1&lang=en`
  * @returns null for the full page
  */

@@ -18,12 +18,7 @@ export type AnswerInputs = Partial<Record<Answered, AnswerInput>>;
 // An older time stamp of a gamepad does not belong to the press just seen [ms].
 const FRESH_MS = 200;
 
-/**
- * Return whether a button has another meaning.
- *
- * @param profile of its device
- * @param index of the button
- */
+/** Return whether a button has another meaning; `profile` of its device; `index` of the button. */
 export function isTaken(profile: Profile, index: number): boolean {
   const { reverse, lights, put_back } = profile;
   return [reverse.on, reverse.off, reverse.toggle, reverse.held,
@@ -35,7 +30,6 @@ export function isTaken(profile: Profile, index: number): boolean {
 /**
  * Return what a button answers. By default any free button answers a request, and any a light; a
  * driver who may get both answers lights by the first free one.
- *
  * @param profile of its device
  * @param index of the button
  * @returns null for nothing

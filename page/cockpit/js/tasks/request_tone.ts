@@ -53,10 +53,7 @@ export class RequestTone {
     this.#sounding = [];
   }
 
-  /**
-   * @param pitch [Hz]
-   * @param at time of the context [s]
-   */
+  /** `pitch` [Hz]; `at`: time of the context [s]. */
   #beep(context: AudioContext, pitch: number, at: number, gain: number) {
     const tone = new OscillatorNode(context, { type: 'triangle', frequency: pitch });
     const level = new GainNode(context, { gain: 0 });

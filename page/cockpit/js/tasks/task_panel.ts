@@ -13,11 +13,7 @@ import type { GameTask } from './task_messages.js';
 const KINDS = { detection_response: 'Detection response', take_over: 'Take-over request',
   secondary_task: 'Secondary task' };
 
-/**
- * Create the panel; without tasks there is none.
- *
- * @param root #panel-events
- */
+/** Create the panel; without tasks there is none. */
 export function createTaskPanel(root: HTMLElement, store: Store, connection: Connection) {
   const cards = new TriggerCards<GameTask>(store, connection, {
     deed: 'begin or end tasks',

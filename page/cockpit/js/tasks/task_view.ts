@@ -59,7 +59,6 @@ export class TaskView {
 
   /**
    * Show a request, or none.
-   *
    * @param request `free`: the seat is free, so that it can be taken here
    */
   showRequest(request: { label: string; hint: string; free: boolean } | null) {

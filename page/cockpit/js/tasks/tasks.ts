@@ -235,7 +235,6 @@ export class Tasks {
 
   /**
    * Draw the corner for a photodiode, if the address names one.
-   *
    * @param lit whether a stimulus is in the same picture
    */
   #drawCorner(lit: boolean) {

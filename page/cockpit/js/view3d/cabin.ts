@@ -15,7 +15,6 @@ const PILLAR_M = 0.05;
 
 /**
  * Make the inside of a vehicle, relative to its rear axle on the road.
- *
  * @param paint its colour
  * @returns seen from the driver's eye only
  */
@@ -78,11 +77,7 @@ function addFrame(mesh: MeshBuilder,
   }
 }
 
-/**
- * A straight bar from one point to another.
- *
- * @param width [m]
- */
+/** A straight bar from one point to another; `width` [m]. */
 function bar(mesh: MeshBuilder, from: Point, to: Point, width: number) {
   const w = width / 2;
   const section = ([x, y, z]: Point): Point[] => [[x + w, y - w, z - w], [x + w, y + w, z - w],

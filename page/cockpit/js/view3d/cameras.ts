@@ -38,7 +38,6 @@ export interface CameraPose extends Point {
 
 /**
  * Return a camera at a point of a vehicle.
- *
  * @param point ahead of the rear axle, to the left, above the road [m]
  * @param aside how far it looks to the left of straight ahead [rad]
  * @param pitch how far it looks upwards [rad]
@@ -57,7 +56,6 @@ export function mountedAt(stand: Stand, point: Point, aside = 0, pitch = 0): Cam
 
 /**
  * Return a camera behind and above a vehicle.
- *
  * @param rear end of the vehicle, ahead of its rear axle [m]
  * @param aside how far it looks to the left of straight ahead [rad]
  */

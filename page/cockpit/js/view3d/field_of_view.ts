@@ -18,7 +18,6 @@ export interface Seat { screen_width_m: number; eye_distance_m: number }
 
 /**
  * Return the vertical angle of a picture from its horizontal one.
- *
  * @param across [rad]
  * @param aspect width through height
  * @returns [rad], limited in both directions
@@ -29,7 +28,6 @@ export function heightAngle(across: number, aspect: number): number {
 
 /**
  * Return the angle under which the driver sees a picture that is centred in front.
- *
  * @param share of the screen's width that the picture covers
  * @returns across the picture [rad]
  */
@@ -39,7 +37,6 @@ export function trueAngle({ screen_width_m, eye_distance_m }: Seat, share: numbe
 
 /**
  * Choose the angle across a picture.
- *
  * @param seat null for the chosen angle
  * @param chosen_deg across the picture [deg]
  * @param width of the picture [CSS px]
@@ -57,7 +54,6 @@ export function acrossAngle(seat: Seat | null, chosen_deg: number, width: number
 
 /**
  * Read the entries about screen and seat.
- *
  * @param width of the screen [cm]
  * @param distance of the eyes from it [cm]
  * @returns null if they are not valid

@@ -15,11 +15,7 @@ export class FrameCost {
     this.#context = context;
   }
 
-  /**
-   * Begin a picture.
-   *
-   * @returns whether it is measured: then `end` is called
-   */
+  /** Begin a picture; return whether it is measured: then `end` is called. */
   begin(): boolean {
     this.#count += 1;
     if (this.#count % EVERY !== 0) {

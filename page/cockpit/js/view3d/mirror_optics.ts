@@ -44,7 +44,6 @@ export interface MirrorCamera {
  *
  * The glass stands across the line on which the driver sees its middle. The eye at distance d has
  * its image behind the glass at 1/d' = 1/d + 2/R (the mirror equation for a far eye, f = -R/2).
- *
  * @param place eyes and mirrors of the vehicle
  * @returns null without this mirror
  */

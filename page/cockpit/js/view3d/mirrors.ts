@@ -46,7 +46,6 @@ export class Mirrors {
 
   /**
    * Fit the mirrors into a picture.
-   *
    * @param width [CSS px]
    * @param height [CSS px]
    * @param ratio of pixels to CSS pixels
@@ -69,10 +68,7 @@ export class Mirrors {
     }
   }
 
-  /**
-   * @param place of the vehicle
-   * @param far [m]
-   */
+  /** `place` of the vehicle; `far` [m]. */
   fit(place: DriverPlace, far: number) {
     for (const glass of this.#glasses) {
       glass.optics = mirrorCamera(glass.mirror, place);
@@ -87,11 +83,7 @@ export class Mirrors {
     }
   }
 
-  /**
-   * Draw the next mirror.
-   *
-   * @param aim puts a camera where the vehicle is
-   */
+  /** Draw the next mirror; `aim` puts a camera where the vehicle is. */
   drawNext(renderer: WebGLRenderer, scene: Scene3,
     aim: (camera: PerspectiveCamera, optics: MirrorCamera) => void) {
     const { mirror, target, camera, optics, size } = this.#glasses[this.#next];

@@ -64,10 +64,7 @@ export class Picture {
   #last: { stand: Stand; mirrors: boolean; inside: boolean } | null = null;
   store;
 
-  /**
-   * @param three the library
-   * @throws {Error} if the browser has no WebGL 2
-   */
+  /** @throws {Error} if the browser has no WebGL 2 */
   constructor(three: Three, canvas: HTMLCanvasElement, store: Store) {
     this.#three = three;
     const name = rendererName();
@@ -121,10 +118,7 @@ export class Picture {
     return this.#origin;
   }
 
-  /**
-   * @param width [CSS px]
-   * @param height [CSS px]
-   */
+  /** `width` [CSS px]; `height` [CSS px]. */
   resize(width: number, height: number) {
     this.#size = { width, height };
     const { ratio } = this.#quality;
@@ -136,7 +130,6 @@ export class Picture {
 
   /**
    * Draw one picture.
-   *
    * @param shown current rows
    * @param now_ms the animation frame's time
    * @returns false while nothing can be seen
@@ -251,7 +244,6 @@ export class Picture {
 
   /**
    * Submit the things that a camera sees.
-   *
    * @param sooner share of the distance at which things are plain
    * @param own whether the own vehicle is drawn
    */

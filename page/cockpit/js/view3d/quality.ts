@@ -47,11 +47,7 @@ const SLOWEST_MS = 50;
 /** Names of renderers that are the processor itself. */
 const SOFTWARE_NAMES = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
-/**
- * Return whether a renderer is the processor.
- *
- * @param name from WEBGL_debug_renderer_info
- */
+/** Return whether a renderer is the processor; `name` from WEBGL_debug_renderer_info. */
 export function isSoftware(name: string): boolean {
   return SOFTWARE_NAMES.test(name);
 }
@@ -98,7 +94,6 @@ export class Quality {
 
   /**
    * Record the cost of a picture.
-   *
    * @param cost_ms time until it was complete
    * @returns whether ratio or detail have changed
    */

@@ -10,7 +10,6 @@ const SLOW = 1;
 /**
  * Return the steering angle of a single-track model with this motion:
  * tan(angle) = wheelbase * yaw rate / speed.
- *
  * @param wheelbase [m]
  * @param speed along its heading, below 0 backwards [m/s]
  * @param yaw_rate [rad/s]

@@ -121,7 +121,6 @@ export class Traffic {
 
   /**
    * Place all bodies at their current poses.
-   *
    * @param own id of the vehicle in which the camera may be
    * @param eye of the camera, in the group's coordinates
    */
@@ -170,10 +169,7 @@ export class Traffic {
     this.#headlights.see(sight);
   }
 
-  /**
-   * @param id of a driven vehicle
-   * @returns its colour, which does not depend on its driver
-   */
+  /** Return a driven vehicle's colour, which does not depend on its driver. */
   paintOf(id: string): number {
     return this.#vehicles.find((thing) => thing.id === id)?.look.paint ?? 0;
   }
@@ -255,7 +251,6 @@ function kindOf(type: string, { wheels, lamps }: Body): PlacedBody['kind'] {
 
 /**
  * Return the height of the road midway between two points along the heading, and the slope.
- *
  * @param x [m]
  * @param y [m]
  * @param yaw [rad]

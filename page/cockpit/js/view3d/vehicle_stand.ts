@@ -12,7 +12,6 @@ import type { HeightAt } from './traffic.js';
 
 /**
  * Return the pose of a vehicle's rear axle on the road, and the slope.
- *
  * @param index of the vehicle
  * @returns null while it has no place
  */

@@ -106,11 +106,7 @@ export class View3d {
       ?? vehicles[0]?.id ?? null;
   }
 
-  /**
-   * Show the 3D view or the map.
-   *
-   * @returns whether it is shown: it needs three.js and WebGL 2
-   */
+  /** Show the 3D view or the map; return whether it is shown: it needs three.js and WebGL 2. */
   async show(on: boolean): Promise<boolean> {
     this.#on = on && await this.#load();
     this.#canvas.hidden = !this.#on;
@@ -130,7 +126,6 @@ export class View3d {
 
   /**
    * Draw once more and return it as PNG, because the browser discards the drawing after a frame.
-   *
    * @returns null while nothing can be seen
    */
   async snapshot(): Promise<Blob | null> {

@@ -18,11 +18,7 @@ const VIEWS: Record<Viewpoint, { strokes: string; title: string }> = {
   bird: { strokes: 'M12 3v10M8 9l4 4l4-4M5 20h14M8 16.5h8', title: 'From above (C: next)' },
 };
 
-/**
- * Put the buttons on the stage.
- *
- * @returns update shows the state
- */
+/** Put the buttons on the stage; `update` shows the state. */
 export function createViewButtons(stage: HTMLElement, settings: ViewSettings,
   { toggle, choose }: { toggle: () => void;
   choose: (viewpoint: Viewpoint) => void }): { update: (on: boolean,

@@ -66,7 +66,6 @@ export class ViewSettings {
 
   /**
    * Choose for this page only: the browser does not remember it.
-   *
    * @param fieldOfView_deg null leaves it as it is [deg]
    */
   fix(switches: Record<Switch, boolean>, fieldOfView_deg: number | null) {

@@ -19,7 +19,6 @@ export interface ViewWindow {
 
 /**
  * Read a page's address.
- *
  * @param query `?view=driver&yaw=-60`, degrees to the left; `vehicle` and `fov` besides
  * @returns null for a page with map and panels
  */

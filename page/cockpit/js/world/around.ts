@@ -22,7 +22,6 @@ export interface Body { id: string; x: number; y: number; yaw: number; speed: nu
 
 /**
  * Describe the objects around a vehicle, the nearest first.
- *
  * @param driven whether this page drives it
  * @param range visibility [m]
  */
@@ -54,11 +53,7 @@ function directionOf(own: Body, other: Body) {
     'ahead right'][eighth];
 }
 
-/**
- * Keep the text up to date, once a second at most; it is read out only on request.
- *
- * @param root #around
- */
+/** Keep the text up to date, once a second at most; it is read out only on request. */
 export function createAround(root: HTMLElement, store: Store): { describe: () => string } {
   const describe = () => {
     const seat = window.crgame.driving?.seat ?? null;

@@ -14,8 +14,6 @@ const RING_DASH_PX = [5, 4];
 
 /**
  * Draw the outline of a thing.
- *
- * @param context of the world
  * @param view camera, palette and ratio
  * @param thing with its look and color
  * @param x of its centre [m]

@@ -9,11 +9,7 @@ import type { WorldActions } from './toolbar.js';
 const ZOOM_STEP = 1.25;
 const TURN_STEP = Math.PI / 12;
 
-/**
- * Make keys move the camera.
- *
- * @returns ends it
- */
+/** Make keys move the camera; return a function that ends it. */
 export function attachKeys(actions: WorldActions): () => void {
   const bindings: Record<string, (() => void) | undefined> = {
     '+': () => actions.zoomBy(ZOOM_STEP),

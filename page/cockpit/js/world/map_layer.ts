@@ -210,7 +210,6 @@ function faded(scale: number, [from, to]: number[]) {
 
 /**
  * Round a length up to 1, 2 or 5 times a power of ten.
- *
  * @param length any positive length
  * @returns the rounded one
  */

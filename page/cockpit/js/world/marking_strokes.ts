@@ -50,11 +50,7 @@ export function roadClass(
   return speed_limit > MOTORWAY_MPS ? 'motorway' : speed_limit > COUNTRY_MPS ? 'country' : 'town';
 }
 
-/**
- * Return the strokes or kerb along a boundary.
- *
- * @param lanelet whose boundary it is
- */
+/** Return the strokes or kerb along a boundary; `lanelet` whose boundary it is. */
 export function strokesOf({ marking, inner }: Pick<Boundary, 'marking' | 'inner'>,
   lanelet: Lanelet): Stroke[] {
   const layout = LAYOUTS[roadClass(lanelet)];

@@ -12,12 +12,7 @@ const NARROW_REM = 21;
 const lengths = [0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000];
 const texts = lengths.map((length) => (length < 1000 ? `${length} m` : `${length / 1000} km`));
 
-/**
- * Draw both if there is room.
- *
- * @param context of the world
- * @param view camera, palette and ratio
- */
+/** Draw both if there is room; `view`: camera, palette and ratio. */
 export function drawOverlay(context: CanvasRenderingContext2D,
   { camera, palette, ratio }: Pick<View, 'camera' | 'palette' | 'ratio'>) {
   const rem = palette.rem_px;

@@ -58,7 +58,6 @@ export class Painter {
 
   /**
    * Show or hide a layer.
-   *
    * @param name as for World.setLayer
    * @param on whether it is shown
    * @throws {RangeError} when there is no such layer
@@ -80,11 +79,7 @@ export class Painter {
     }
   }
 
-  /**
-   * Paint one frame.
-   *
-   * @param context of the canvas
-   */
+  /** Paint one frame. */
   paint(context: CanvasRenderingContext2D, view: View) {
     context.globalAlpha = 1;
     this.map.draw(context, view);

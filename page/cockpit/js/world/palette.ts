@@ -19,7 +19,6 @@ export function colorNameOf({ role, type }: { role: string; type: string }): Col
 
 /**
  * Resolve a custom property to a colour for canvas and plots.
- *
  * @param name without the leading dashes
  * @returns a CSS colour without variables
  */
@@ -36,7 +35,6 @@ export function themeColor(name: string): string {
 
 /**
  * Call a function at each change of the system's theme or of data-theme on <html>.
- *
  * @param changed called after the new colours are in force
  */
 export function onThemeChange(changed: () => void) {

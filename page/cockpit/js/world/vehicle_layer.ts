@@ -55,7 +55,6 @@ export class VehicleLayer {
 
   /**
    * Return the pose of the centre of a driven vehicle or an object in the frame shown last.
-   *
    * @param id of it
    * @param shown of Store.displayed
    * @returns null while it is absent
@@ -75,7 +74,6 @@ export class VehicleLayer {
 
   /**
    * Return the vehicle or object at a point of the canvas.
-   *
    * @returns the id of the nearest within a finger's reach
    */
   pick(px: number, py: number, { camera, shown }: LiveView): string | null {
@@ -210,7 +208,6 @@ function drawTyres(context: CanvasRenderingContext2D, { camera, ratio, palette }
 
 /**
  * Draw indicators at the corners, blue lights on the roof, and the horn as arcs ahead.
- *
  * @param context in the vehicle's coordinates
  */
 function drawLights(context: CanvasRenderingContext2D, { shown, palette }: LiveView,

@@ -56,10 +56,7 @@ export class World {
   #away = false;
   #view: View;
 
-  /**
-   * @param canvas its parent gets the toolbar
-   * @param store what is shown
-   */
+  /** @param canvas its parent gets the toolbar */
   constructor(canvas: HTMLCanvasElement, store: Store, options: Options = {}) {
     this.#canvas = canvas;
     this.#context = canvas.getContext('2d', { alpha: false }) as CanvasRenderingContext2D;
@@ -101,7 +98,6 @@ export class World {
 
   /**
    * Keep the camera on a vehicle or object.
-   *
    * @param id null releases the camera
    * @param headingUp turn the map so that it drives upwards; as before by default
    */
@@ -109,10 +105,7 @@ export class World {
     this.#navigation.follow(id, headingUp);
   }
 
-  /**
-   * @param index of a driven vehicle
-   * @returns undefined for none
-   */
+  /** Return a driven vehicle, undefined for none. */
   vehicle(index: number): DrawnVehicle | undefined {
     return this.#painter.vehicles.vehicles[index];
   }
@@ -124,7 +117,6 @@ export class World {
 
   /**
    * Show or hide a layer.
-   *
    * @param name plans, predictions, goals, labels or object_labels, or one that was added
    * @param on whether it is shown
    * @throws {RangeError} when there is no such layer
@@ -137,12 +129,7 @@ export class World {
     this.#changed();
   }
 
-  /**
-   * Add an external layer.
-   *
-   * @param name for setLayer
-   * @param draw called in each frame
-   */
+  /** Add an external layer; `name` for setLayer; `draw` called in each frame. */
   addLayer(name: string, draw: DrawLayer, where: Place = 'below') {
     this.#painter.add(name, draw, where);
     this.redraw();
@@ -150,7 +137,6 @@ export class World {
 
   /**
    * Set a function that chooses which things are drawn as outlines.
-   *
    * @param choose called in each frame with the input of layers; returns 1 for each vehicle, then
    *   object, that is hollow, null for none
    */

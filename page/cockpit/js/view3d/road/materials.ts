@@ -20,7 +20,6 @@ export const GRAIN_ANISOTROPY = 8;
 
 /**
  * Return a grain as of asphalt, whose motion conveys speed.
- *
  * @returns grey, repeated, never darker than two thirds
  */
 export function grainTexture(three: Three): DataTexture {
@@ -45,7 +44,6 @@ export function grainTexture(three: Three): DataTexture {
 
 /**
  * Make ranks decide which of two flat things at one height is visible.
- *
  * @param material of meshes with an attribute `rank`
  */
 export function ranked<M extends Material>(material: M): M {

@@ -70,7 +70,6 @@ export class Obstacles {
 
 /**
  * Join the occupied cells to blocks, along rows and across equal rows.
- *
  * @returns that hold each occupied cell once, MOST_BLOCKS at most
  */
 export function blocksOf(

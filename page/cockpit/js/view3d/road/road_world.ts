@@ -45,12 +45,7 @@ export interface RoadWorld {
   dispose: () => void; // frees the memory of the graphics card
 }
 
-/**
- * Build the world of a scene.
- *
- * @param three the library
- * @param scene the scene document
- */
+/** Build the world of a scene. */
 export function createRoadWorld(three: Three, scene: Scene): RoadWorld {
   const origin = localOrigin(scene);
   const index = new RoadIndex(scene.lanelets);

@@ -20,7 +20,6 @@ const shapeParts = () => new MeshParts({ x: 0, y: 0 });
 
 /**
  * Add a body of revolution around the vertical: a trunk, a cone, a ball of a few rings.
- *
  * @param profile from below
  * @param round how many corners it has
  */

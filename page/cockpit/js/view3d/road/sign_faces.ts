@@ -115,7 +115,6 @@ const FACES: Record<string, (value: string, country: string) => Face> = {
 
 /**
  * Return the plate of a sign.
- *
  * @param kind name in commonroad-io
  * @param value additional value, as in the file
  * @param country three letters
@@ -135,7 +134,6 @@ export function faceOf(kind: string, value: string, country: string): Face {
 
 /**
  * Return a speed as written on signs.
- *
  * @param value [m/s], as the file has it
  * @returns [km/h], a multiple of 5 if it is nearly one; other text unchanged
  */

@@ -56,10 +56,7 @@ export class TrafficLights {
   #housings;
   #shown: (string | undefined)[];
 
-  /**
-   * @param three the library
-   * @param painted of poles and housings
-   */
+  /** @param painted of poles and housings */
   constructor(three: Three, lights: LightPole[], origin: Origin, heights: Heights,
     painted: Material) {
     this.#three = three;
@@ -103,11 +100,7 @@ export class TrafficLights {
     return 6 * this.#lights.length + this.#poles.triangles + this.#housings.triangles;
   }
 
-  /**
-   * Show the signals.
-   *
-   * @param states by the lights' ids
-   */
+  /** Show the signals; `states` by the lights' ids. */
   update(states: Record<string, string>, eye: { x: number; y: number }) {
     this.#poles.update(eye);
     this.#housings.update(eye);
