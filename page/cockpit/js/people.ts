@@ -9,8 +9,7 @@ import { post } from './panels/scenario_api.js';
 import { tellRefusal } from './rights.js';
 
 import type { Connection } from './connection.js';
-import type { DeviceDelay, Present } from './people_messages.js';
-import type { RoleName } from './messages.js';
+import type { DeviceDelay, Present, RoleName } from './messages.js';
 import type { Store } from './store.js';
 
 const ROLES: [role: string, text: string][] = [['all', 'Director and driver'],

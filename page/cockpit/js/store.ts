@@ -6,23 +6,21 @@ import { CriticalityLog } from './criticality.js';
 import { DisplayClock } from './display_clock.js';
 import { decodeFrame, KIND } from './frames.js';
 import { addToHistory, emptyHistory } from './history.js';
-import { ServerClock } from './server_clock.js';
 import { extrapolateVehicles, interpolateVehicles, moveObjects } from './interpolation.js';
 import { Perceived } from './perceived.js';
 import { SampleRing } from './samples.js';
+import { ServerClock } from './server_clock.js';
 
 import type {
   CriticalityFrame, ObjectsFrame, PerceptionFrame, PlanFrame, PredictionFrame, StateFrame,
 } from './frames.js';
 import type { History } from './history.js';
 import type {
-  Alarm, AlarmsMessage, EventsMessage, Exposure, FilesMessage, FiredEvent, HelloMessage, Measure,
-  NoticeMessage, RunState, Scene, SceneMessage, Seat, SeatsMessage, SignalsMessage, Status,
-  StatusMessage, StoreMessage,
+  Alarm, AlarmsMessage, DeviceDelay, EventsMessage, Exposure, FilesMessage, FiredEvent,
+  HelloMessage, Measure, NoticeMessage, PeopleMessage, Present, Rights, RunState, Scene,
+  SceneMessage, Seat, SeatsMessage, SignalsMessage, Status, StatusMessage, StoreMessage,
+  YouMessage,
 } from './messages.js';
-import type {
-  DeviceDelay, PeopleMessage, Present, Rights, YouMessage,
-} from './people_messages.js';
 import type { TasksMessage } from './tasks/task_messages.js';
 
 // Samples for a replay of the last 10 s: states at 100 Hz, and scenario steps at up to 25 Hz.

@@ -18,7 +18,7 @@ import type { Profile } from '../../cockpit/js/driving/gamepad_profile.js';
 
 export type Movement = 'left' | 'right' | 'throttle' | 'brake';
 
-export const MOVEMENTS: Movement[] = ['left', 'right', 'throttle', 'brake'];
+const MOVEMENTS: Movement[] = ['left', 'right', 'throttle', 'brake'];
 // This share of its travel counts as moved.
 const MOVED = 0.6;
 // An axis this far from its first position was moved by the participant.

@@ -8,7 +8,7 @@ import { icon } from '../panels/icons.js';
 
 import type { Store } from '../store.js';
 
-export const REPLAYED_S = 10;
+const REPLAYED_S = 10;
 const SPEEDS = [1, 0.5, 0.25, 0.1];
 const DRAWN_EVERY_MS = 100;
 

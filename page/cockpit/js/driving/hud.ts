@@ -1,13 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The instruments over the world, of the driven or the watched vehicle. */
+/** The instruments and keys over the world, of the driven or the watched vehicle. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { LIGHT, shining } from '../lights.js';
 import { DEGREES, KMH } from '../units.js';
 import { PedalBar, SteeringBar } from './gauges.js';
-import { Keycaps } from './keycaps.js';
-import { LightSigns } from './light_signs.js';
 import { SpeedLimits } from './speed_limit.js';
 import { SteeringWheel } from './steering_wheel.js';
 
@@ -227,4 +226,92 @@ function turnBlock({ angle, command, steering }: { angle: HTMLElement; command: 
 function label(text: string, value: HTMLElement) {
   return element('div', { class: 'hud-labelled' },
     element('span', { class: 'bar-label', text }), value);
+}
+
+const SIGNS: [name: 'left' | 'horn' | 'right', sign: string, title: string][] = [
+  ['left', '◄', 'Left indicator'], ['horn', '♪', 'Horn'], ['right', '►', 'Right indicator'],
+];
+
+/** Three signs; `node` goes into the instruments. */
+class LightSigns {
+  #signs = SIGNS.map(([name, text, title]) => ({
+    name, title, node: element('span', { class: `sign sign-${name}`, role: 'img', title, text }),
+  }));
+  node;
+
+  constructor() {
+    this.node = element('div', { class: 'hud-lights' }, ...this.#signs.map(({ node }) => node));
+  }
+
+  /** Update the signs; `lights` as the vehicle's state has them; `t`: simulation time [s]. */
+  show(lights: number, t: number) {
+    const shines = shining(lights, t);
+    for (const { name, title, node } of this.#signs) {
+      // Screen readers are told once, not at each blink.
+      setAttribute(node, 'aria-label', `${title} ${(lights & LIGHT[name]) > 0 ? 'on' : 'off'}`);
+      setAttribute(node, 'data-on', shines[name]);
+    }
+  }
+}
+
+// The place of a key, its label, the other key with the same function, and a sign beside it.
+const CAPS: [code: string, text: string, twin: string | null, title: string, sign?: string][] = [
+  ['KeyW', 'W', 'ArrowUp', 'Throttle'], ['KeyR', 'R', null, 'Reverse gear'],
+  ['KeyA', 'A', 'ArrowLeft', 'Left'], ['KeyS', 'S', 'ArrowDown', 'Brake'],
+  ['KeyD', 'D', 'ArrowRight', 'Right'], ['Space', 'Space', null, 'Brake'],
+  ['Comma', ',', null, 'Left indicator', '◄'], ['Period', '.', null, 'Right indicator', '►'],
+  ['KeyJ', 'J', null, 'Hazard lights', '◄►'], ['KeyG', 'G', null, 'Horn', '♪'],
+];
+
+/** The drawn keys; `node` goes into the page. */
+class Keycaps {
+  #caps = new Map<string, HTMLElement>();
+  node;
+
+  /** @param keyboard receives touch presses */
+  constructor(keyboard: Pick<Keyboard, 'press' | 'lift'>) {
+    for (const [code, text, , title, sign] of CAPS) {
+      const lift = () => keyboard.lift(code);
+      this.#caps.set(code, element('kbd', { class: `cap cap-${code}`, title,
+        text: sign === undefined ? text : `${text} ${sign}`, on: {
+        pointerdown: (event) => {
+          event.preventDefault();
+          // A finger that slides off the key still holds it.
+          (event.currentTarget as HTMLElement).setPointerCapture(event.pointerId);
+          keyboard.press(code);
+        },
+        pointerup: lift, pointercancel: lift, lostpointercapture: lift,
+        contextmenu: (event) => event.preventDefault(),
+      } }));
+    }
+    this.node = element('div', { class: 'keycaps', role: 'group',
+      'aria-label': 'Keys: W throttle, A left, S brake, D right, space brake, R reverse, '
+        + 'comma and period indicators, J hazard lights, G horn, Backspace back on the lane '
+        + 'after a contact' },
+    ...this.#caps.values());
+    this.#readLayout();
+  }
+
+  /** Light the held keys; `reverse`: whether the reverse gear is requested. */
+  show(keyboard: Keyboard, reverse: boolean) {
+    for (const [code, , twin] of CAPS) {
+      const on = code === 'KeyR' ? reverse
+        : keyboard.isHeld(code) || (twin !== null && keyboard.isHeld(twin));
+      setAttribute(this.#cap(code), 'data-on', on);
+    }
+  }
+
+  /** @param code of CAPS */
+  #cap(code: string): HTMLElement {
+    return this.#caps.get(code) as HTMLElement;
+  }
+
+  /** Write the labels of the user's keyboard layout, if the browser knows it. */
+  async #readLayout() {
+    const layout = await navigator.keyboard?.getLayoutMap?.().catch(() => undefined);
+    for (const [code, text, , , sign] of CAPS) {
+      const key = layout?.get(code)?.toUpperCase() ?? text;
+      setText(this.#cap(code), sign === undefined ? key : `${key} ${sign}`);
+    }
+  }
 }

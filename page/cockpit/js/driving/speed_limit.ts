@@ -21,7 +21,6 @@ export class SpeedLimits {
   #lanes: Lane[] = [];
   #scene;
 
-  /** @param scene the scene document */
   constructor(scene: Scene | null) {
     this.#scene = scene;
     for (const lanelet of scene?.lanelets ?? []) {

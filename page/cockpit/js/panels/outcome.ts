@@ -4,20 +4,16 @@
 
 import { scoreBlock } from '../after/score.js';
 import { element, setAttribute } from '../dom.js';
-import {
-  reasonAgainst, reasonAgainstOrder, reasonAgainstSeat, tellRefusal,
-} from '../rights.js';
+import { reasonAgainst, reasonAgainstOrder, reasonAgainstSeat, tellRefusal } from '../rights.js';
 import { confirm } from './confirm.js';
 import { clockTime, oneLine } from './format.js';
 import { icon } from './icons.js';
-import { mishapsOf } from './mishaps.js';
-import { figures, fileList, table } from './outcome_card.js';
-import { RunResult } from './run_result.js';
+import { figures, fileList, RunResult, table } from './outcome_card.js';
 
 import type { Connection } from '../connection.js';
 import type { Reply, RunAction, RunState } from '../messages.js';
-import type { Result } from './outcome_card.js';
 import type { Store } from '../store.js';
+import type { Result } from './outcome_card.js';
 
 // How long a mishap is shown to its driver while the run continues [ms].
 const MISHAP_MS = 10000;
@@ -352,4 +348,22 @@ function driverText({ seat, run, holder, holderName, me }: Awaiting) {
   }
   const whose = holder === me ? 'your hands are' : `the hands of ${oneLine(holderName)} are`;
   return `${seat} waits: ${whose} off the controls.`;
+}
+
+interface Mishap { t: number; touched: boolean; text: string }
+
+/**
+ * Return the contacts and road departures of a vehicle, in the order of time.
+ * @param mine the vehicle
+ */
+function mishapsOf({ status }: Store, mine: string): Mishap[] {
+  const { contacts = [], departures = [] } = status ?? {};
+  const touched = (t: number, other: string): Mishap => ({
+    t, touched: true, text: `You touched ${oneLine(other)} at ${clockTime(t)}.` });
+  return [
+    ...contacts.filter((item) => item.vehicle === mine || item.with === mine).map(
+      (item) => touched(item.t, item.vehicle === mine ? item.with : item.vehicle)),
+    ...departures.filter(({ vehicle }) => vehicle === mine).map(({ t }) => ({
+      t, touched: false, text: `You left the road at ${clockTime(t)}.` })),
+  ].sort((a, b) => a.t - b.t);
 }

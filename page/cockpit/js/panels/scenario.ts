@@ -4,7 +4,6 @@
 
 import { element, setAttribute, setText } from '../dom.js';
 import { reasonAgainst } from '../rights.js';
-import { Busy } from './busy.js';
 import { confirm } from './confirm.js';
 import { acceptDrops } from './drop.js';
 import { errorText, oneLine, plural } from './format.js';
@@ -14,8 +13,8 @@ import { ScenarioForm } from './scenario_form.js';
 import { ScenarioList } from './scenario_list.js';
 import { ScenarioPreview } from './scenario_preview.js';
 
-import type { Connection } from '../connection.js';
 import type { Entry, Offer, Preview } from '../api_messages.js';
+import type { Connection } from '../connection.js';
 import type { Store } from '../store.js';
 
 // A larger file is not sent, because the server would refuse it [bytes].
@@ -311,4 +310,49 @@ export function createScenario(root: HTMLElement, store: Store,
   store.on(['hello', 'you'], seen);
   seen();
   return panel;
+}
+
+const SHOWN_AFTER_MS = 300;
+const COUNTED_AFTER_S = 2;
+
+/** Hidden until begun. */
+class Busy {
+  #text = element('span', {});
+  #timer = 0;
+  #since = 0;
+  #words = '';
+  root;
+
+  constructor() {
+    this.root = element('div', { class: 'busy', role: 'status', hidden: true },
+      element('div', { class: 'busy-bar', 'aria-hidden': 'true' }), this.#text);
+  }
+
+  /**
+   * Start, or change the text; the seconds count from the first call.
+   * @param words what is being done
+   */
+  describe(words: string) {
+    this.#words = words;
+    if (this.#timer === 0) {
+      this.#since = performance.now();
+      this.#timer = setInterval(() => this.#show(), 100);
+    }
+    this.#show();
+  }
+
+  /** Hide it. */
+  end() {
+    clearInterval(this.#timer);
+    this.#timer = 0;
+    this.root.hidden = true;
+  }
+
+  #show() {
+    const passed_ms = performance.now() - this.#since;
+    this.root.hidden = passed_ms < SHOWN_AFTER_MS;
+    const seconds = Math.floor(passed_ms / 1e3);
+    setText(this.#text,
+      seconds >= COUNTED_AFTER_S ? `${this.#words} ${seconds} s` : this.#words);
+  }
 }

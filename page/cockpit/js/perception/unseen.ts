@@ -11,7 +11,6 @@ export class Unseen {
   #scene;
   #flags;
 
-  /** @param scene the scene document */
   constructor(scene: Scene) {
     this.#scene = scene;
     this.#flags = new Uint8Array(scene.vehicles.length + scene.objects.length);

@@ -4,7 +4,7 @@
 
 import { KIND } from '../frames.js';
 
-import type { ReplayInfo } from '../replay_messages.js';
+import type { ReplayInfo } from '../api_messages.js';
 
 // Number of chunks kept: a little more than two seeks and the way between them need; 5 s each.
 const KEPT = 12;

@@ -4,8 +4,8 @@
 
 import { countWhile } from '../search.js';
 
+import type { ReplayInfo, ReplayTracks } from '../api_messages.js';
 import type { RunState, Status, StoreMessage } from '../messages.js';
-import type { ReplayInfo, ReplayTracks } from '../replay_messages.js';
 import type { Store } from '../store.js';
 
 const STATUS_MS = 200;

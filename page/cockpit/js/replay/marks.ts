@@ -4,7 +4,7 @@
 
 import { element, svg } from '../dom.js';
 
-import type { ReplayMark } from '../replay_messages.js';
+import type { ReplayMark } from '../api_messages.js';
 
 // Shapes on a 12 x 12 grid and the name of each kind; the colours are in replay.css.
 const KINDS = new Map<string, [shape: string, word: string]>([

@@ -7,8 +7,8 @@ import { ReplayDocuments } from './documents.js';
 import { ReplayFeed } from './replay_feed.js';
 import { Timeline } from './timeline.js';
 
+import type { ReplayInfo, ReplayMark } from '../api_messages.js';
 import type { RunState } from '../messages.js';
-import type { ReplayInfo, ReplayMark } from '../replay_messages.js';
 import type { Store } from '../store.js';
 import type { Now } from './documents.js';
 

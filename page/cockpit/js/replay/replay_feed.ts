@@ -8,9 +8,9 @@ import { addToHistory, emptyHistory } from '../history.js';
 import { countWhile } from '../search.js';
 import { ask, Chunks, unpack } from './chunks.js';
 
+import type { ReplayInfo } from '../api_messages.js';
 import type { StateFrame } from '../frames.js';
 import type { History } from '../history.js';
-import type { ReplayInfo } from '../replay_messages.js';
 import type { Store } from '../store.js';
 import type { Entry } from './chunks.js';
 

@@ -5,7 +5,7 @@
 import { element, setAttribute, setText, svg } from '../dom.js';
 import { eventText, mark } from './marks.js';
 
-import type { ReplayInfo, ReplayMark } from '../replay_messages.js';
+import type { ReplayInfo, ReplayMark } from '../api_messages.js';
 import type { Player } from './player.js';
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];

@@ -5,7 +5,7 @@
 import { makeFilter, Value } from './voices.js';
 
 /** Frequencies of the two notes [Hz]. */
-export const NOTES_Hz = Object.freeze([420, 500]);
+const NOTES_Hz = Object.freeze([420, 500]);
 const AMPLITUDE = 0.14;
 const ATTACK_S = 0.015;
 const GONE_S = 0.2;

@@ -1,11 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The bare page of a driver: it takes its seat and reports to the framing page. */
+/** The bare page of a driver: it takes its seat, and talks with the page that frames it. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { languageOf, WORDS } from '../driver_words.js';
 import { keepProfiles } from '../driving/gamepad_profile.js';
-import { FrameLink } from './frame_link.js';
 import { readStage } from './stage_address.js';
 
 import type { Connection } from '../connection.js';
@@ -300,4 +299,45 @@ export function createStage(root: HTMLElement, store: Store, connection: Connect
     throw new Error('the address names no seat');
   }
   return new Stage(root, store, connection, address);
+}
+
+/** The sender and receiver of messages to the framing page. */
+class FrameLink {
+  #store;
+  #told = '';
+  #heard = '';
+
+  /** `store` whose `framedBy` has the origins; `ordered` called for each order of that page. */
+  constructor(store: Store, ordered: (order: StageOrder) => void) {
+    this.#store = store;
+    window.addEventListener('message', ({ source, origin, data }) => {
+      if (source === window.parent && window.parent !== window && origin !== ''
+          && store.framedBy.includes(origin) && isOrder(data)) {
+        this.#heard = origin;
+        ordered(data);
+      }
+    });
+  }
+
+  /** Send the state if it has changed. */
+  send(state: StageState) {
+    const { framedBy } = this.#store;
+    const text = JSON.stringify(state);
+    if (window.parent !== window && framedBy.length > 0 && text !== this.#told) {
+      this.#told = text;
+      // The browser gives it only to a page of the named origin.
+      for (const origin of this.#heard === '' ? framedBy : [this.#heard]) {
+        window.parent.postMessage({ crgame: 1, kind: 'stage', state }, origin);
+      }
+    }
+  }
+}
+
+function isOrder(data: unknown): data is StageOrder {
+  if (typeof data !== 'object' || data === null) {
+    return false;
+  }
+  const { crgame, kind, ready, profiles } = data as Record<string, unknown>;
+  return crgame === 1 && (kind === 'focus' || (kind === 'ready' && typeof ready === 'boolean')
+    || (kind === 'calibrations' && typeof profiles === 'object' && profiles !== null));
 }

@@ -8,7 +8,7 @@ import { FIELD_OF_VIEW } from '../view3d/field_of_view.js';
 import type { StageView } from './stage_messages.js';
 
 /** Corners of the view for a photodiode. */
-export const CORNERS = ['top-left', 'top-right', 'bottom-left', 'bottom-right'] as const;
+const CORNERS = ['top-left', 'top-right', 'bottom-left', 'bottom-right'] as const;
 
 export interface StageAddress {
   seat: string; // id of the vehicle that is driven

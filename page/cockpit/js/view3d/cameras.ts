@@ -1,8 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The poses of the 3D view's cameras, in the map's coordinates. */
+/** The poses of the 3D view's cameras and of their vehicle, in the map's coordinates. */
 
+import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { DEGREE } from '../units.js';
+import { poseOf } from './traffic.js';
+
+import type { SceneVehicle } from '../messages.js';
+import type { Shown } from '../store.js';
+import type { HeightAt } from './traffic.js';
 
 const CHASE_BEHIND_M = 6.5;
 const CHASE_ABOVE_M = 3.4;
@@ -69,4 +75,23 @@ export function chasing(stand: Stand, rear: number, aside = 0): CameraPose {
 export function above(stand: Stand): CameraPose {
   return mountedAt({ ...stand, slope: 0 }, { x: BIRD_AHEAD_M, y: 0, z: BIRD_ABOVE_M }, 0,
     -90 * DEGREE);
+}
+
+/**
+ * Return the pose of a vehicle's rear axle on the road, and the slope.
+ * @param index of the vehicle
+ * @returns null while it has no place
+ */
+export function standOf(shown: Shown, index: number, vehicle: SceneVehicle,
+  heightAt: HeightAt): Stand | null {
+  const row = index * VEHICLE_WIDTH;
+  const [x, y] = [shown.vehicles[row], shown.vehicles[row + 1]];
+  const yaw = shown.vehicles[row + VEHICLE.yaw];
+  if (!Number.isFinite(x + y + yaw)) {
+    return null;
+  }
+  const ahead = vehicle.rear_to_center;
+  const { z, slope } = poseOf(x + ahead * Math.cos(yaw), y + ahead * Math.sin(yaw), yaw,
+    0.35 * vehicle.shape.length, heightAt);
+  return { x, y, yaw, z: z - ahead * Math.sin(slope), slope };
 }

@@ -3,19 +3,17 @@
 /** One canvas on which three.js draws: the renderer, the world, the bodies and the cameras. */
 
 import { DEGREE, DEGREES } from '../units.js';
-import { above, chasing, mountedAt } from './cameras.js';
 import { createCabin } from './cabin.js';
+import { above, chasing, mountedAt, standOf } from './cameras.js';
 import { eyeOf, mirrorOf, seenBy } from './contents.js';
-import { FrameCost } from './frame_cost.js';
 import { localOrigin } from './local_origin.js';
 import { Mirrors } from './mirrors.js';
 import { PlanRibbons } from './plan_ribbons.js';
-import { isSoftware, Quality } from './quality.js';
+import { FrameCost, isSoftware, Quality } from './quality.js';
 import { createRoadWorld } from './road/road_world.js';
 import { sightOf } from './seen_instances.js';
 import { product } from './solid_boxes.js';
 import { Traffic } from './traffic.js';
-import { standOf } from './vehicle_stand.js';
 
 import type { PerspectiveCamera } from 'three';
 import type { Scene, SceneVehicle } from '../messages.js';

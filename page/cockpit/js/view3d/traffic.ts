@@ -11,18 +11,17 @@ import { plainBody } from './bodies/plain_bodies.js';
 import { FittedParts } from './fitted_parts.js';
 import { Headlights } from './headlights.js';
 import { Instances } from './instances.js';
-import { steeringOf } from './steering.js';
 
 import type { Group } from 'three';
 import type { Scene, SceneObject } from '../messages.js';
 import type { Shown, Store } from '../store.js';
 import type { Appearance } from './bodies/appearance.js';
 import type { Body } from './bodies/motor_vehicles.js';
-import type { Origin } from './local_origin.js';
-import type { Three } from './three.js';
 import type { Named } from './contents.js';
+import type { Origin } from './local_origin.js';
 import type { Sight } from './seen_instances.js';
 import type { Triple } from './solid_boxes.js';
+import type { Three } from './three.js';
 
 export interface Thing {
   id: string;
@@ -264,4 +263,25 @@ export function poseOf(x: number, y: number, yaw: number, reach: number,
   const front = heightAt(x + dx, y + dy);
   const rear = heightAt(x - dx, y - dy);
   return { z: 0.5 * (front + rear), slope: Math.atan2(front - rear, 2 * reach) };
+}
+
+// Largest steering angle of cars [rad].
+const MOST = 0.65;
+// Below this speed, the quotient is unreliable: the wheels straighten up to standstill [m/s].
+const SLOW = 1;
+
+/**
+ * Return the steering angle of a single-track model with this motion:
+ * tan(angle) = wheelbase * yaw rate / speed.
+ * @param wheelbase [m]
+ * @param speed along its heading, below 0 backwards [m/s]
+ * @param yaw_rate [rad/s]
+ * @returns [rad], positive to the left; 0 at standstill
+ */
+export function steeringOf(wheelbase: number, speed: number, yaw_rate: number): number {
+  if (Math.abs(speed) < Number.EPSILON) {
+    return 0;
+  }
+  const angle = Math.atan(wheelbase * yaw_rate / speed);
+  return Math.min(Math.max(angle, -MOST), MOST) * Math.min(Math.abs(speed) / SLOW, 1) ** 2;
 }

@@ -8,8 +8,7 @@ import { VIEWPOINTS } from './cameras.js';
 import { acrossAngle, heightAngle } from './field_of_view.js';
 import { KeyAnswer } from './key_answer.js';
 import { SeatClock } from './seat_clock.js';
-import { createViewButtons } from './view_buttons.js';
-import { ViewSettings } from './view_settings.js';
+import { createViewButtons, ViewSettings } from './view_settings.js';
 import { ViewTeller } from './view_teller.js';
 import { readViewWindow } from './view_window.js';
 

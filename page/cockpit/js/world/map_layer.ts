@@ -37,7 +37,6 @@ export class MapLayer {
   /** Whether the AVs' goals are shown. */
   goals = true;
 
-  /** @param scene the scene document */
   load(scene: Scene) {
     this.#chunks = buildChunks(scene);
     this.#stops = scene.stop_lines.map(({ points }) => local(points, addLine));

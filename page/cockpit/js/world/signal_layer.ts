@@ -24,7 +24,6 @@ const HIDDEN_BELOW = 1.2;
 export class SignalLayer {
   #lights: (Light & { ends: number[][] })[] = [];
 
-  /** @param scene the scene document */
   load(scene: Scene) {
     const lanelets = new Map(scene.lanelets.map((lanelet) => [lanelet.id, lanelet]));
     this.#lights = scene.lights.map((light) => ({

@@ -90,7 +90,6 @@ export class Atmosphere {
   /** The fog of every material. */
   fog;
 
-  /** @param three the library */
   constructor(three: Three) {
     fogAsAirDoes(three);
     this.#three = three;

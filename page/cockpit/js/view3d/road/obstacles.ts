@@ -28,7 +28,6 @@ export class Obstacles {
   #map: OccupancyFrame | null = null;
   mesh;
 
-  /** @param three the library */
   constructor(three: Three, origin: Origin, heights: Heights, painted: Material) {
     this.#three = three;
     this.#origin = origin;

@@ -25,7 +25,7 @@ const SAME_SIGN_M = 15;
 const LIGHTS_APART_M = 0.7;
 
 /** Find a place for a pole: as in the map, else to the right of its traffic, or the left. */
-export function poleAt({ x, y, yaw }: { x: number; y: number; yaw: number },
+function poleAt({ x, y, yaw }: { x: number; y: number; yaw: number },
   index: RoadIndex): Pole {
   const right = { x: Math.sin(yaw), y: -Math.cos(yaw) };
   for (const side of [1, -1]) {

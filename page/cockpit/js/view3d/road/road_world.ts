@@ -6,22 +6,22 @@ import { localOrigin } from '../local_origin.js';
 import { Atmosphere } from './atmosphere.js';
 import { buildLand } from './land.js';
 import { geometryOf, GRAIN_ANISOTROPY, grainTexture, paintedMaterial } from './materials.js';
-import { buildRoads } from './road_chunks.js';
 import { Obstacles } from './obstacles.js';
 import { placeLights, placeSigns } from './poles.js';
+import { buildRoads } from './road_chunks.js';
 import { RoadIndex } from './road_index.js';
 import { placeRoadside } from './roadside.js';
-import { Scenery } from './scenery.js';
+import { Scenery } from './scenery_shapes.js';
 import { Signs } from './signs.js';
 import { TrafficLights } from './traffic_lights.js';
 
 import type { FogExp2, Group, Mesh, Object3D } from 'three';
-import type { MeshParts } from './mesh_parts.js';
 import type { Environment, Scene } from '../../messages.js';
 import type { Store } from '../../store.js';
+import type { Named } from '../contents.js';
 import type { Sight } from '../seen_instances.js';
 import type { Three } from '../three.js';
-import type { Named } from '../contents.js';
+import type { MeshParts } from './mesh_parts.js';
 
 const LAND_ORDER = 900;
 
