@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The dialog that measures which axes of a device steer, and their range; the mapping is tried. */
+/** The dialog that measures which axes of a device steer, and how far, and tries the mapping. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { CalibrationRun, STEPS } from './calibration_run.js';
