@@ -68,7 +68,7 @@ test('the address is that of the page', () => {
   globalThis.window.location = new URL('https://host/x?y');
   const connection = new Connection({ setConnected() {} });
   assert.equal(FakeSocket.all.at(-1).url, 'wss://host/ws');
-  assert.equal(connection.open, false);
+  assert.equal(connection.socket.open, false);
   globalThis.window.location = new URL('http://127.0.0.1:8080/');
 });
 
@@ -126,7 +126,7 @@ test('it reconnects after 0.25 s, then after twice as long each time, up to 2 s'
 
 test('a closed connection does not reconnect', (t) => {
   const { connection } = connected();
-  connection.close();
+  connection.socket.close();
   t.mock.timers.tick(60_000);
   assert.equal(FakeSocket.all.length, 1);
 });
