@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { afterEach, beforeEach, mock, test } from 'node:test';
 
-import { NameField } from '../../page/cockpit/js/driving/name_field.js';
+import { nameField } from '../../page/cockpit/js/driving/name_field.js';
 import { People } from '../../page/cockpit/js/people.js';
 import { Person } from '../../page/cockpit/js/person.js';
 import { click, liveStore, openPage, RIGHTS, Server, textOf } from './dom_support.mjs';
@@ -259,7 +259,7 @@ test('without storage, people join, are named and choose their role as ever', as
   const sent = [];
   server.send = (message) => sent.push(message);
   const { headers } = new Person(root, store, server);
-  root.append(new NameField(store, server).node);
+  root.append(nameField(store, server));
   assert.deepEqual(sent, [{ type: 'person', key: headers['X-Crgame-Key'], fresh: true }]);
   const field = root.querySelector('#my-name');
   field.value = 'Anna';

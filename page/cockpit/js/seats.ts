@@ -3,7 +3,7 @@
 /** The seats in the Drive panel: their drivers, and taking and handing over a seat. */
 
 import { element, setAttribute, setText } from './dom.js';
-import { NameField } from './driving/name_field.js';
+import { nameField } from './driving/name_field.js';
 import { describeSeat } from './driving/seat_text.js';
 import { reasonAgainstSeat, tellRefusal } from './rights.js';
 
@@ -52,8 +52,7 @@ export class Seats {
       element('h2', { id: 'seats-title', text: 'Seats' }), this.#news, this.#list);
     const replay = element('p', { class: 'drive-note', hidden: true,
       text: 'This is a recording: its seats cannot be taken. Click a vehicle to follow it.' });
-    const name = new NameField(store, connection).node;
-    this.#live = [name, seats, driving.devices];
+    this.#live = [nameField(store, connection), seats, driving.devices];
     this.#replay = replay;
     root.append(replay, ...this.#live);
     store.on('seats', () => {

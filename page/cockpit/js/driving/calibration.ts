@@ -6,8 +6,7 @@ import { element, setAttribute, setText } from '../dom.js';
 import { CalibrationRun, STEPS } from './calibration_run.js';
 import { connectedPads } from './gamepad.js';
 import { gearAfter, loadProfile, pedalValue, sampleOf, steeringValue } from './gamepad_profile.js';
-import { PedalBar, SteeringBar } from './gauges.js';
-import { SteeringWheel } from './steering_wheel.js';
+import { pedalBar, steeringBar, steeringWheel } from './gauges.js';
 
 import type { CalibrationStep, Kind, Place } from './calibration_run.js';
 import type { Control, Profile, Sample } from './gamepad_profile.js';
@@ -196,10 +195,10 @@ class CalibrationTest {
   #profile: Profile | null = null;
   #reverse = false;
   #pressed: boolean[] = [];
-  #wheel = new SteeringWheel();
+  #wheel = steeringWheel();
   #bars = {
-    steering: new SteeringBar(), throttle: new PedalBar('throttle', 'Throttle'),
-    brake: new PedalBar('brake', 'Brake'),
+    steering: steeringBar(), throttle: pedalBar('throttle', 'Throttle'),
+    brake: pedalBar('brake', 'Brake'),
   };
   #gear = element('span', { class: 'hud-gear', text: 'D' });
   #tuning = element('div', { class: 'tuning' });

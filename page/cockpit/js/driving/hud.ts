@@ -6,9 +6,8 @@ import { element, setAttribute, setText } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { LIGHT, shining } from '../lights.js';
 import { DEGREES, KMH } from '../units.js';
-import { PedalBar, SteeringBar } from './gauges.js';
+import { pedalBar, steeringBar, steeringWheel } from './gauges.js';
 import { SpeedLimits } from './speed_limit.js';
-import { SteeringWheel } from './steering_wheel.js';
 
 import type { Scene, SceneVehicle } from '../messages.js';
 import type { Store } from '../store.js';
@@ -193,9 +192,9 @@ function buildParts(keyboard: Keyboard) {
     angle: span('angle', 'Angle of the front wheels, positive to the left'),
     command: span('command', 'Steering command, positive to the left'),
     limit: element('span', { class: 'hud-limit', role: 'img', title: 'Speed limit' }),
-    throttle: new PedalBar('throttle', 'Throttle'), brake: new PedalBar('brake', 'Brake'),
-    steering: new SteeringBar(), wheel: new SteeringWheel(), keycaps: new Keycaps(keyboard),
-    lights: new LightSigns(),
+    throttle: pedalBar('throttle', 'Throttle'), brake: pedalBar('brake', 'Brake'),
+    steering: steeringBar(), wheel: steeringWheel(), keycaps: new Keycaps(keyboard),
+    lights: lightSigns(),
     banner: element('div', { class: 'hud-banner', role: 'status', 'aria-live': 'polite' }),
   };
   const board = element('div', { class: 'hud-board' },
@@ -210,7 +209,7 @@ function buildParts(keyboard: Keyboard) {
 }
 
 function speedBlock({ kmh, ms, acceleration, lights }: Record<'kmh' | 'ms' | 'acceleration',
-  HTMLElement> & { lights: LightSigns }) {
+  HTMLElement> & { lights: ReturnType<typeof lightSigns> }) {
   return element('div', { class: 'hud-speed' }, lights.node,
     element('div', { class: 'hud-main' }, kmh,
       element('span', { class: 'hud-unit', text: 'km/h' })),
@@ -218,7 +217,7 @@ function speedBlock({ kmh, ms, acceleration, lights }: Record<'kmh' | 'ms' | 'ac
 }
 
 function turnBlock({ angle, command, steering }: { angle: HTMLElement; command: HTMLElement;
-  steering: SteeringBar }) {
+  steering: ReturnType<typeof steeringBar> }) {
   return element('div', { class: 'hud-turn' }, element('div', { class: 'hud-angles' },
     label('Wheels', angle), label('Steering', command)), steering.node);
 }
@@ -232,26 +231,23 @@ const SIGNS: [name: 'left' | 'horn' | 'right', sign: string, title: string][] = 
   ['left', '◄', 'Left indicator'], ['horn', '♪', 'Horn'], ['right', '►', 'Right indicator'],
 ];
 
-/** Three signs; `node` goes into the instruments. */
-class LightSigns {
-  #signs = SIGNS.map(([name, text, title]) => ({
+/** Make the signs over the speed, lit like the vehicle's lights. */
+function lightSigns() {
+  const signs = SIGNS.map(([name, text, title]) => ({
     name, title, node: element('span', { class: `sign sign-${name}`, role: 'img', title, text }),
   }));
-  node;
-
-  constructor() {
-    this.node = element('div', { class: 'hud-lights' }, ...this.#signs.map(({ node }) => node));
-  }
-
-  /** Update the signs; `lights` as the vehicle's state has them; `t`: simulation time [s]. */
-  show(lights: number, t: number) {
-    const shines = shining(lights, t);
-    for (const { name, title, node } of this.#signs) {
-      // Screen readers are told once, not at each blink.
-      setAttribute(node, 'aria-label', `${title} ${(lights & LIGHT[name]) > 0 ? 'on' : 'off'}`);
-      setAttribute(node, 'data-on', shines[name]);
-    }
-  }
+  return {
+    node: element('div', { class: 'hud-lights' }, ...signs.map(({ node }) => node)),
+    /** Update the signs; `lights` as the vehicle's state has them; `t`: simulation time [s]. */
+    show(lights: number, t: number) {
+      const shines = shining(lights, t);
+      for (const { name, title, node } of signs) {
+        // Screen readers are told once, not at each blink.
+        setAttribute(node, 'aria-label', `${title} ${(lights & LIGHT[name]) > 0 ? 'on' : 'off'}`);
+        setAttribute(node, 'data-on', shines[name]);
+      }
+    },
+  };
 }
 
 // The place of a key, its label, the other key with the same function, and a sign beside it.

@@ -34,7 +34,7 @@ class ScenarioPanel {
   #list = new ScenarioList((entry) => this.choose(entry.id),
     (entry) => this.#delete(entry));
   #form = new ScenarioForm();
-  #busy = new Busy();
+  #busy = busyBar();
   #canvas = element('canvas', { class: 'preview', 'aria-label': 'Preview of the scenario' });
   #drawing = new ScenarioPreview(this.#canvas);
   #facts = element('p', { class: 'dim' });
@@ -315,44 +315,34 @@ export function createScenario(root: HTMLElement, store: Store,
 const SHOWN_AFTER_MS = 300;
 const COUNTED_AFTER_S = 2;
 
-/** Hidden until begun. */
-class Busy {
-  #text = element('span', {});
-  #timer = 0;
-  #since = 0;
-  #words = '';
-  root;
-
-  constructor() {
-    this.root = element('div', { class: 'busy', role: 'status', hidden: true },
-      element('div', { class: 'busy-bar', 'aria-hidden': 'true' }), this.#text);
-  }
-
-  /**
-   * Start, or change the text; the seconds count from the first call.
-   * @param words what is being done
-   */
-  describe(words: string) {
-    this.#words = words;
-    if (this.#timer === 0) {
-      this.#since = performance.now();
-      this.#timer = setInterval(() => this.#show(), 100);
-    }
-    this.#show();
-  }
-
-  /** Hide it. */
-  end() {
-    clearInterval(this.#timer);
-    this.#timer = 0;
-    this.root.hidden = true;
-  }
-
-  #show() {
-    const passed_ms = performance.now() - this.#since;
-    this.root.hidden = passed_ms < SHOWN_AFTER_MS;
+/** Make a moving bar for a long task, with a text and the elapsed seconds, hidden until begun. */
+function busyBar() {
+  const text = element('span', {});
+  const root = element('div', { class: 'busy', role: 'status', hidden: true },
+    element('div', { class: 'busy-bar', 'aria-hidden': 'true' }), text);
+  let [timer, since, words] = [0, 0, ''];
+  const show = () => {
+    const passed_ms = performance.now() - since;
+    root.hidden = passed_ms < SHOWN_AFTER_MS;
     const seconds = Math.floor(passed_ms / 1e3);
-    setText(this.#text,
-      seconds >= COUNTED_AFTER_S ? `${this.#words} ${seconds} s` : this.#words);
-  }
+    setText(text, seconds >= COUNTED_AFTER_S ? `${words} ${seconds} s` : words);
+  };
+  return {
+    root,
+    /** Start, or change the words of what is done; the seconds count from the first call. */
+    describe(what: string) {
+      words = what;
+      if (timer === 0) {
+        since = performance.now();
+        timer = setInterval(show, 100);
+      }
+      show();
+    },
+    /** Hide it. */
+    end() {
+      clearInterval(timer);
+      timer = 0;
+      root.hidden = true;
+    },
+  };
 }

@@ -54,7 +54,7 @@ class Perception {
     this.#store = store;
     this.#connection = connection;
     this.#world = world;
-    this.#legend = new Legend(stage);
+    this.#legend = createLegend(stage);
     this.#addLayers(world);
     this.#group = element('div', { class: 'world-group' });
     stage.querySelector('.world-toolbar')?.append(this.#group);
@@ -234,39 +234,32 @@ const ENTRIES: Record<string, [strokes: string, words: string]> = {
 // Replaces the first entry while the planner's knowledge is unknown.
 const UNKNOWN = 'what $ sees is not known now';
 
-/** A small table over the map. */
-class Legend {
-  #root;
-  #rows = new Map<string, { row: HTMLElement; text: HTMLElement }>();
-
-  /** @param stage that holds the canvas */
-  constructor(stage: HTMLElement) {
-    this.#root = element('ul', { class: 'world-legend', 'aria-label': 'Legend', hidden: true });
-    for (const [name, [strokes]] of Object.entries(ENTRIES)) {
-      const text = element('span', {});
-      const row = element('li', { 'data-layer': name, hidden: true },
-        svg('svg', { viewBox: '0 0 28 16', 'aria-hidden': 'true' },
-          svg('path', { d: strokes })), text);
-      this.#rows.set(name, { row, text });
-      this.#root.append(row);
-    }
-    stage.append(this.#root);
-  }
-
-  /**
-   * Show the entries of the layers on the map.
-   * @param names of the layers
-   * @param av id of the AV that is followed
-   * @param known whether it is known what it sees
-   */
-  show(names: string[], av: string, known: boolean) {
-    for (const [name, { row, text }] of this.#rows) {
-      const words = name === 'unseen' && !known ? UNKNOWN : ENTRIES[name][1];
-      setText(text, words.replace('$', av));
-      setAttribute(row, 'hidden', !names.includes(name));
-    }
-    setAttribute(this.#root, 'hidden', names.length === 0);
-  }
+/** Put the legend on the stage. */
+function createLegend(stage: HTMLElement) {
+  const root = element('ul', { class: 'world-legend', 'aria-label': 'Legend', hidden: true });
+  const rows = Object.entries(ENTRIES).map(([name, [strokes, words]]) => {
+    const text = element('span', {});
+    const row = element('li', { 'data-layer': name, hidden: true },
+      svg('svg', { viewBox: '0 0 28 16', 'aria-hidden': 'true' }, svg('path', { d: strokes })),
+      text);
+    root.append(row);
+    return { name, words, row, text };
+  });
+  stage.append(root);
+  return {
+    /**
+     * Show the entries of the named layers on the map.
+     * @param av id of the AV that is followed
+     * @param known whether it is known what it sees
+     */
+    show(names: string[], av: string, known: boolean) {
+      for (const { name, words, row, text } of rows) {
+        setText(text, (name === 'unseen' && !known ? UNKNOWN : words).replace('$', av));
+        setAttribute(row, 'hidden', !names.includes(name));
+      }
+      setAttribute(root, 'hidden', names.length === 0);
+    },
+  };
 }
 
 // Cells smaller than this on the screen are merged by fours, repeatedly [px].
