@@ -22,7 +22,8 @@ export function pedalBar(kind: string, label: string) {
   const value = element('span', { class: 'bar-value', text: '–' });
   return {
     node: element('div', { class: `pedal pedal-${kind}` },
-      element('div', { class: 'bar' }, fill, key), value, element('span', { class: 'bar-label', text: label })),
+      element('div', { class: 'bar' }, fill, key), value,
+      element('span', { class: 'bar-label', text: label })),
     /** Show a command, 0 to 1 or NaN if none is in force, and whether its key is held. */
     show(command: number, held: boolean) {
       stretch(fill, 'Y', command);
