@@ -181,11 +181,7 @@ export type Draw = (node: HTMLElement, ...what: object[]) => Promise<unknown>;
     }
   }
 
-  /**
-   * Mark a time in all plots of its run.
-   *
-   * @param time [s]
-   */
+  /** Mark a time in all plots of its run; `time` [s]. */
   function choose(run: string, time: number) {
     chosen.set(run, time);
     for (const node of drawn.keys()) {

@@ -168,7 +168,7 @@ LEAVINGS = {
     'open dialog': Leaving('dialog', lambda page: page.click('[data-action="reset"]'),
                            lambda page: page.click('dialog[open] button:not(.danger)')),
     'closed socket': Leaving('connection',
-                             lambda page: page.run('crgame.connection.interrupt();'),
+                             lambda page: page.run('crgame.connection.socket.interrupt();'),
                              _get_the_seat_back),
 }
 # Notes the step at which the hands leave, and the page's messages about its hands.

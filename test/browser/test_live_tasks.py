@@ -101,7 +101,7 @@ def test_lights_requests_and_notes_are_shown_answered_and_recorded(
         page.wait('document.querySelector(".task-light").hidden', 'the light to go out')
     press(page)  # An answer without a light.
     page.tab('events')
-    page.click('[data-task="radio"] button')
+    page.click('.task-panel [data-name="radio"] button')
     page.wait_for_text('.task-note', 'Aufgabe: Radio')
     page.wait('window.seen.length > 3', 'a light that nobody answers')
     page.wait('window.seen.length > 4', 'a light that a pause interrupts')
@@ -124,7 +124,7 @@ def test_lights_requests_and_notes_are_shown_answered_and_recorded(
               'the end of the light that a reload interrupted', reloaded)
     page.give_back('hv0')
     page.tab('events')
-    page.click('[data-task="call"] button')
+    page.click('.task-panel [data-name="call"] button')
     page.wait('!document.querySelector(".task-request").hidden', 'the request')
     assert 'Übernehmen' in page.text('.task-request')
     assert 'Baustelle' in page.text('.task-request')

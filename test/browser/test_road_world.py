@@ -59,7 +59,7 @@ const { stage, world, camera, renderer, origin } = window.roadTest;
 const [x, y, z, yaw, pitch, states] = arguments;
 camera.position.set(x - origin.x, y - origin.y, z);
 camera.rotation.set(Math.PI / 2 + pitch, 0, yaw - Math.PI / 2);
-world.update({ signals: { states }, perceived: { occupancy: null } }, 0, camera.position);
+world.update({ signals: { states }, perceived: { occupancy: null } }, camera.position);
 renderer.render(stage, camera);
 const gl = renderer.getContext();
 const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];

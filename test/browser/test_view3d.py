@@ -313,6 +313,43 @@ def test_what_is_left_out_of_pictures_is_hardly_seen(page: Browser) -> None:
         assert view['share'] < 0.7
 
 
+def test_a_new_scene_has_the_map_colours_and_frees_the_cabin(page: Browser) -> None:
+    """A driven bicycle has its driver's colour, and the cabin before is thrown away once."""
+    found = page.run_async("""
+        const { Color, DoubleSide, Material } = await import('/three/three.module.js');
+        const { Instances } = await import('/static/js/view3d/instances.js');
+        const { themeColor } = await import('/static/js/world/palette.js');
+        const { store, view3d: { picture } } = crgame;
+        const { add } = Instances.prototype;
+        const { dispose } = Material.prototype;
+        const found = { wanted: new Color(themeColor('human')).getHex(), drawn: [], freed: 0 };
+        Instances.prototype.add = function (matrix, color, isOwn) {
+          found.drawn.push(...isOwn ? [color] : []);
+          return add.call(this, matrix, color, isOwn);
+        };
+        Material.prototype.dispose = function () {
+          found.freed += this.isMeshLambertMaterial && this.side === DoubleSide ? 1 : 0;
+          return dispose.call(this);
+        };
+        const draw = (viewpoint) => picture.draw(store.displayed(performance.now()),
+          performance.now(), { viewpoint, index: 0, aside: 0, height: 0.8, mirrors: false,
+            plans: false });
+        const { scene } = store;
+        const [first, ...others] = scene.vehicles;
+        draw('driver');
+        store.receive({ ...scene, vehicles: [{ ...first, type: 'bicycle' }, ...others] });
+        found.drawn.length = 0;
+        draw('chase');
+        Instances.prototype.add = add;
+        store.receive({ ...scene, vehicles: [{ ...first }, ...others] });
+        draw('driver');
+        Material.prototype.dispose = dispose;
+        return found;""")
+    # Its wheels are added before it.
+    assert found['drawn'][-1] == found['wanted']
+    assert found['freed'] == 1
+
+
 @pytest.mark.clock
 def test_a_lost_graphics_context_is_survived(page: Browser) -> None:
     """The page reports it; after the context's return the pictures are as before."""

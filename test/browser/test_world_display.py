@@ -195,7 +195,7 @@ def test_connection_that_breaks_is_taken_up_again(
     clients = list(page.backend.hub.clients)
     browser.run("""window.lost = false;
         crgame.store.on('connection', (connected) => { window.lost ||= !connected; });
-        crgame.connection.interrupt();""")
+        crgame.connection.socket.interrupt();""")
     browser.wait('window.lost', 'the loss')
     browser.wait('crgame.store.connected && crgame.store.me.id !== arguments[0]',
                  'the connection', arguments=(clients[0],))
@@ -218,5 +218,5 @@ def test_simulation_that_began_anew_behind_a_new_connection_is_shown(
         time.sleep(0.3)
         assert shown(browser)['epoch'] == 2
         page.backend.n = 0
-        browser.run('crgame.connection.interrupt()')
+        browser.run('crgame.connection.socket.interrupt()')
         browser.wait('crgame.world.shown?.epoch === 0 && crgame.world.shown.n === 0')

@@ -8,7 +8,8 @@ import { beforeEach, test } from 'node:test';
 import { Connection } from '../../page/cockpit/js/connection.js';
 import { InputSender } from '../../page/cockpit/js/driving/sender.js';
 import { ServerClock } from '../../page/cockpit/js/server_clock.js';
-import { frameOf } from './support.mjs';
+import { DeskConnection } from '../../page/desk/js/desk_connection.js';
+import { close, frameOf } from './support.mjs';
 
 /** A server that a test controls. */
 class FakeSocket extends EventTarget {
@@ -67,7 +68,7 @@ test('the address is that of the page', () => {
   globalThis.window.location = new URL('https://host/x?y');
   const connection = new Connection({ setConnected() {} });
   assert.equal(FakeSocket.all.at(-1).url, 'wss://host/ws');
-  assert.equal(connection.open, false);
+  assert.equal(connection.socket.open, false);
   globalThis.window.location = new URL('http://127.0.0.1:8080/');
 });
 
@@ -125,7 +126,7 @@ test('it reconnects after 0.25 s, then after twice as long each time, up to 2 s'
 
 test('a closed connection does not reconnect', (t) => {
   const { connection } = connected();
-  connection.close();
+  connection.socket.close();
   t.mock.timers.tick(60_000);
   assert.equal(FakeSocket.all.length, 1);
 });
@@ -165,4 +166,31 @@ test('input is sent at each change and twenty times a second, hands off once', (
   hands = { keys: [1, 1, 1, 1], reverse: 0 };
   t.mock.timers.tick(500);
   assert.equal(sent.length, 8);
+});
+
+test("the desk's clock follows a page's clock that drifts, and a new connection", (t) => {
+  let now_ms = 1000;
+  t.mock.method(performance, 'now', () => now_ms);
+  const desk = new DeskConnection('ws', { opened() {}, lost() {}, received() {} });
+  const pong = (at_s, trip_ms) => {
+    const sent = now_ms;
+    now_ms += trip_ms;
+    FakeSocket.all.at(-1).say({ type: 'pong', t: sent, at: at_s + trip_ms / 2000 });
+  };
+  close(desk.now_s, (performance.timeOrigin + now_ms) / 1000);
+  FakeSocket.all[0].accept();
+  pong(1e9, 2);
+  close(desk.now_s, 1e9 + 0.002, 1e-6);
+  // An hour in which the page's clock loses 100 ms: the quickest ping of all was the first.
+  for (let s = 1; s <= 3600; s += 1) {
+    now_ms = 1000 + 999.972 * s;
+    pong(1e9 + s, s % 10 === 0 ? 4 : 20);
+  }
+  close(desk.now_s, 1e9 + 3600.004, 0.003);
+  FakeSocket.all[0].close();
+  t.mock.timers.tick(250);
+  FakeSocket.all.at(-1).accept();
+  close(desk.now_s, 1e9 + 3600.004, 0.003);
+  pong(2e9, 90);
+  close(desk.now_s, 2e9 + 0.09, 1e-6);
 });

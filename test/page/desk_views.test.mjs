@@ -7,6 +7,7 @@ import { setImmediate as soon } from 'node:timers/promises';
 import { beforeEach, test } from 'node:test';
 
 import { breakView, clockTime } from '../../page/desk/js/break_view.js';
+import { DeviceCheck } from '../../page/desk/js/device_check.js';
 import { Draft, draftName, forgetOtherDrafts } from
   '../../page/desk/js/draft.js';
 import { doubtWords, kindWords, stateWords } from '../../page/desk/js/item_words.js';
@@ -62,6 +63,17 @@ test('a break that is over is over at once, and takes no focus', (t) => {
   const { node, next } = rest(t, 0);
   assert.equal(textOf(node), 'Break Go on whenever you are ready. Next');
   assert.deepEqual([next.disabled, document.activeElement === next], [false, false]);
+});
+
+test('a check of the controls that is left leaves no dialog', () => {
+  new Pictures();
+  navigator.getGamepads = () => [];
+  for (const open of [false, true]) {
+    const check = new DeviceCheck({ text: '' }, new Words(), () => {});
+    document.querySelector('dialog.calibration').open = open;
+    check.end();
+    assert.equal(document.querySelector('dialog'), null);
+  }
 });
 
 test('a break that is left counts no more', (t) => {

@@ -4,8 +4,8 @@
 
 import type { Connection } from '../../page/cockpit/js/connection.js';
 import type { Driving } from '../../page/cockpit/js/driving/driving.js';
-import type { createPerson } from '../../page/cockpit/js/person.js';
-import type { createInstantReplay } from '../../page/cockpit/js/after/instant_replay.js';
+import type { Person } from '../../page/cockpit/js/person.js';
+import type { InstantReplay } from '../../page/cockpit/js/after/instant_replay.js';
 import type { createScenario } from '../../page/cockpit/js/panels/scenario.js';
 import type { Plotly } from '../../page/cockpit/js/panels/plotly.js';
 import type { createPerception } from '../../page/cockpit/js/perception/perception.js';
@@ -22,12 +22,12 @@ interface Crgame {
   connection: Connection;
   world: World;
   driving?: Driving;
-  person?: ReturnType<typeof createPerson>;
+  person?: Person;
   perception?: ReturnType<typeof createPerception>;
   sound?: Sound;
   tasks?: Tasks;
   view3d?: View3d;
-  lastSeconds?: ReturnType<typeof createInstantReplay>;
+  lastSeconds?: InstantReplay;
   stage?: Stage;
   scenario?: ReturnType<typeof createScenario>;
   ready?: boolean;

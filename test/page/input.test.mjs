@@ -52,12 +52,14 @@ class FakeElement extends EventTarget {
 globalThis.Element = FakeElement;
 globalThis.WheelEvent = { DOM_DELTA_PIXEL: 0 };
 const page = new EventTarget();
+let dialog = null;
 globalThis.window = page;
 const colors = new Map();
 globalThis.document = Object.assign(new EventTarget(), {
   createElement: (tag) => Object.assign(new FakeElement(tag), { style: {}, remove() {} }),
   createElementNS: (_, tag) => new FakeElement(tag),
   documentElement: new FakeElement('html'),
+  querySelector: (selector) => (selector === 'dialog[open]' ? dialog : null),
 });
 globalThis.getComputedStyle = ({ style }) => ({
   color: colors.get(style?.color?.slice('var(--'.length, -1)) ?? '', fontSize: '18px',
@@ -88,7 +90,7 @@ const pressed = (key, more) => {
   return event;
 };
 
-test('keys of the world: each has its action, and none acts while typing', (t) => {
+test('keys of the world: each has its action, and none acts while typing or in a dialog', (t) => {
   const done = [];
   const note = (name) => (value) => done.push(value === undefined ? name : [name, value]);
   const end = attachKeys({ zoomBy: note('zoom'), turnBy: note('turn'), fit: note('fit'),
@@ -104,6 +106,9 @@ test('keys of the world: each has its action, and none acts while typing', (t) =
     pressed('f', { [command]: true });
   }
   pressed('f', { target: new FakeElement('textarea') });
+  dialog = new FakeElement('dialog');
+  pressed('f');
+  dialog = null;
   // Driving keys are none of them.
   assert.ok(['w', 'a', 's', 'd', 'r', ' ', 'ArrowUp'].every(
     (key) => !pressed(key).defaultPrevented));

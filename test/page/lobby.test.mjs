@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
-import { createLobby } from '../../page/cockpit/js/lobby.js';
+import { Lobby } from '../../page/cockpit/js/lobby.js';
 import { click, liveStore, openPage, RIGHTS, Server, textOf } from './dom_support.mjs';
 
 const VEHICLES = ['hv0', 'hv1'].map((id) => ({ id, role: 'human' }));
@@ -22,7 +22,7 @@ beforeEach(() => {
   [panel, stage] = ['panel-drive', 'stage'].map((id) => document.getElementById(id));
   server = new Server();
   store = liveStore(VEHICLES);
-  createLobby(stage, store, server);
+  new Lobby(stage, store, server);
 });
 
 const status = (more) => store.receive({ type: 'status', run: 'waiting', n: 0, t: 0, epoch: 0,

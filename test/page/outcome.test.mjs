@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { afterEach, beforeEach, mock, test } from 'node:test';
 
-import { createOutcome } from '../../page/cockpit/js/panels/outcome.js';
+import { Outcome } from '../../page/cockpit/js/panels/outcome.js';
 import { click, liveStore, openPage, RIGHTS, Server, textOf } from './dom_support.mjs';
 
 const VEHICLES = [{ id: 'hv0', role: 'human' }, { id: 'av0', role: 'autonomous' }];
@@ -30,7 +30,7 @@ beforeEach(() => {
   latest = { run: 'waiting', n: 0, t: 0, epoch: 0, stays: true, contacts: [], departures: [],
     planners: {}, recording: { state: 'none' }, timing: null };
   store = liveStore(VEHICLES, { contact: 'stop' });
-  createOutcome(root, store, server);
+  new Outcome(root, store, server);
 });
 
 afterEach(() => mock.timers.reset());
@@ -200,6 +200,17 @@ test('a reset while the pause is awaited ends the wish to look', async () => {
   await click(button('look'));
   store.restart(1);
   status({ run: 'paused', epoch: 1, n: 0, contacts: [] });
+  await click(document.body);
+  assert.deepEqual(did, []);
+});
+
+test('a connection that is lost while the pause is awaited ends the wish to look', async () => {
+  touch();
+  await click(button('look'));
+  store.setConnected(false);
+  await click(document.body);
+  store.setConnected(true);
+  status({ run: 'paused' });
   await click(document.body);
   assert.deepEqual(did, []);
 });

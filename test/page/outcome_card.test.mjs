@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { afterEach, beforeEach, mock, test } from 'node:test';
 
-import { createOutcome } from '../../page/cockpit/js/panels/outcome.js';
+import { Outcome } from '../../page/cockpit/js/panels/outcome.js';
 import { click, liveStore, openPage, Server, textOf } from './dom_support.mjs';
 
 const VEHICLES = [{ id: 'hv0', role: 'human' }, { id: 'av0', role: 'autonomous' }];
@@ -28,6 +28,9 @@ beforeEach(() => {
   answer = { vehicles: [], refusal: '' };
   mock.method(globalThis, 'fetch', async (path) => {
     asked.push(path);
+    if (answer === null) {
+      throw new TypeError('Failed to fetch');
+    }
     return new Response(JSON.stringify(answer));
   });
   globalThis.window.crgame = { lastSeconds: { open: () => did.push('look') },
@@ -37,7 +40,7 @@ beforeEach(() => {
   latest = { run: 'running', n: 1, t: 30, epoch: 0, stays: true, contacts: [], departures: [],
     planners: {}, recording: { state: 'recorded' }, timing: null };
   store = liveStore(VEHICLES, { planners: { av0: 'idm' } });
-  createOutcome(root, store, server);
+  new Outcome(root, store, server);
 });
 
 afterEach(() => mock.restoreAll());
@@ -222,6 +225,21 @@ test('a run without a score says why', async () => {
   await settle();
   assert.equal(score(), 'No score: the recording is <b>broken</b>');
   assert.equal(asked.length, 3);
+});
+
+test('a score that a silent server did not give is asked for by a new connection', async () => {
+  answer = null;
+  end('duration');
+  files();
+  await settle();
+  store.setConnected(false);
+  await settle();
+  assert.equal(score(), 'No score: The server does not answer.');
+  answer = { vehicles: [], refusal: 'it is too short' };
+  store.setConnected(true);
+  await settle();
+  assert.equal(score(), 'No score: it is too short');
+  assert.equal(asked.length, 2);
 });
 
 test('the card of a run that is over leads to the next one', async () => {

@@ -5,9 +5,9 @@
 import assert from 'node:assert/strict';
 import { afterEach, beforeEach, mock, test } from 'node:test';
 
-import { NameField } from '../../page/cockpit/js/driving/name_field.js';
-import { createPeople } from '../../page/cockpit/js/people.js';
-import { createPerson } from '../../page/cockpit/js/person.js';
+import { nameField } from '../../page/cockpit/js/driving/name_field.js';
+import { People } from '../../page/cockpit/js/people.js';
+import { Person } from '../../page/cockpit/js/person.js';
 import { click, liveStore, openPage, RIGHTS, Server, textOf } from './dom_support.mjs';
 
 const VEHICLES = [{ id: 'hv0', role: 'human' }, { id: 'hv1', role: 'human' },
@@ -32,7 +32,7 @@ const open = (address = 'http://127.0.0.1:8080/') => {
 
 const begin = () => {
   store = liveStore(VEHICLES);
-  createPeople(root, store, server);
+  new People(root, store, server);
 };
 
 beforeEach(() => {
@@ -258,8 +258,8 @@ test('without storage, people join, are named and choose their role as ever', as
   }
   const sent = [];
   server.send = (message) => sent.push(message);
-  const { headers } = createPerson(root, store, server);
-  root.append(new NameField(store, server).node);
+  const { headers } = new Person(root, store, server);
+  root.append(nameField(store, server));
   assert.deepEqual(sent, [{ type: 'person', key: headers['X-Crgame-Key'], fresh: true }]);
   const field = root.querySelector('#my-name');
   field.value = 'Anna';

@@ -7,7 +7,7 @@ import { setImmediate as soon } from 'node:timers/promises';
 import { beforeEach, test } from 'node:test';
 
 import { mark } from '../../page/cockpit/js/replay/marks.js';
-import { createReplay } from '../../page/cockpit/js/replay/player.js';
+import { Player } from '../../page/cockpit/js/replay/player.js';
 import { Store } from '../../page/cockpit/js/store.js';
 import { click, openPage, Pictures, send, textOf } from './dom_support.mjs';
 import { close, stateFrame } from './support.mjs';
@@ -34,7 +34,7 @@ beforeEach(() => {
     return (answers[pathname.split('/').at(-1)] ?? (() => new Response('')))(searchParams);
   };
   store = new Store();
-  player = createReplay(root, store);
+  player = new Player(root, store);
 });
 
 /** Answer with a chunk of 5 s: the states of one vehicle with x = n. */

@@ -9,6 +9,7 @@ import { describeSeat } from '../../page/cockpit/js/driving/seat_text.js';
 import {
   reasonAgainst, reasonAgainstOrder, reasonAgainstSeat,
 } from '../../page/cockpit/js/rights.js';
+import { Store } from '../../page/cockpit/js/store.js';
 
 const DRIVER = { role: 'driver', directs: false, drives: true, seat: '' };
 
@@ -23,15 +24,17 @@ test('a role gets a reason for forbidden actions and none for allowed ones', () 
 });
 
 test('a driver in the seat may start the run before its first step, and no more', () => {
-  const store = { mode: 'live', rights: DRIVER, me: { id: 'c1' }, status: { n: 0 },
-    seats: { hv0: { holder: 'c1' }, hv1: { holder: null } } };
+  const storeOf = (more) => Object.assign(new Store(), { mode: 'live', rights: DRIVER,
+    me: { id: 'c1' }, status: { n: 0 }, seats: { hv0: { holder: 'c1' }, hv1: { holder: null } },
+    ...more });
+  const store = storeOf({});
   const refused = (action) => `Only a director can ${action} the run; you are a driver.`;
   assert.equal(reasonAgainstOrder(store, 'start'), '');
   assert.equal(reasonAgainstOrder(store, 'reset'), refused('reset'));
-  assert.equal(reasonAgainstOrder({ ...store, status: { n: 1 } }, 'start'), refused('start'));
-  assert.equal(reasonAgainstOrder({ ...store, me: { id: 'c2' } }, 'start'), refused('start'));
+  assert.equal(reasonAgainstOrder(storeOf({ status: { n: 1 } }), 'start'), refused('start'));
+  assert.equal(reasonAgainstOrder(storeOf({ me: { id: 'c2' } }), 'start'), refused('start'));
   assert.equal(reasonAgainstOrder(
-    { ...store, rights: { ...DRIVER, directs: true } }, 'reset'), '');
+    storeOf({ rights: { ...DRIVER, directs: true } }), 'reset'), '');
 });
 
 test('a link for one seat admits to no other, unless it is offered', () => {

@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { setImmediate as soon } from 'node:timers/promises';
 import { afterEach, before, beforeEach, test } from 'node:test';
 
-import { createRunList } from '../../page/cockpit/js/after/run_list.js';
+import { RunList } from '../../page/cockpit/js/after/run_list.js';
 import { click, liveStore, openPage, send, textOf } from './dom_support.mjs';
 
 const run = (id, more = {}) => ({ id, name: `run/${id}`, title: `Title of ${id}`, scenario: 'ZAM',
@@ -47,7 +47,7 @@ async function begin(...runs) {
   if (runs.length > 0) {
     answers.runs = () => Response.json({ runs });
   }
-  createRunList(root, store);
+  new RunList(root, store);
   await settled();
 }
 

@@ -157,7 +157,7 @@ test('the choices are what the person has chosen, until another scenario is show
   form.show({ humans: [{ id: 'hv0', driver: 'auto' }], avs: [] }, DRIVERS, PLANNERS);
   assert.deepEqual(form.choices, { humans: [{ id: 'hv0', driver: 'auto' }], avs: [] });
   assert.equal(form.blame('hv1: no joy'), false, 'it is not in this one');
-  form.clear();
+  form.show({ humans: [], avs: [] }, DRIVERS, PLANNERS);
   assert.equal(textOf(form.root), '');
 });
 

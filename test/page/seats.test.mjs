@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
-import { createSeats } from '../../page/cockpit/js/seats.js';
+import { Seats } from '../../page/cockpit/js/seats.js';
 import { click, liveStore, openPage, RIGHTS, Server, textOf } from './dom_support.mjs';
 
 const VEHICLES = [{ id: 'hv0', role: 'human' }, { id: 'av0', role: 'autonomous' }];
@@ -21,7 +21,7 @@ beforeEach(() => {
   driving = { seat: null, devices: document.createElement('div'), claimed: [], released: 0,
     claim: async (id) => { driving.claimed.push(id); return server.reply; },
     release: async () => { driving.released += 1; return server.reply; } };
-  createSeats(root, store, server, driving);
+  new Seats(root, store, server, driving);
 });
 
 const show = (hv0, av0 = PLANNED) => store.receive({ type: 'seats', seats: { hv0, av0 } });

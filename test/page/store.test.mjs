@@ -8,7 +8,6 @@ import { test } from 'node:test';
 import { KIND } from '../../page/cockpit/js/frames.js';
 import { Store } from '../../page/cockpit/js/store.js';
 import { keepShown } from '../../page/cockpit/js/world/shown.js';
-import { PlanLayer } from '../../page/cockpit/js/world/plan_layer.js';
 import { close, frameOf, stateFrame } from './support.mjs';
 
 const scene = (epoch, more) => ({ type: 'scene', time: { epoch, dt_s: 0.01, dt_c_s: 0.1 },
@@ -157,18 +156,4 @@ test('the drawn state is kept although the store refills its arrays', () => {
   assert.equal(again, kept);
   close([kept.t, kept.vehicles[0]], [1.05, 1.5], 1e-9);
   assert.equal(keepShown(kept, null), null);
-});
-
-test('events of the game hide plans and show them again', () => {
-  const plans = new PlanLayer();
-  const hide = { name: 'a', kind: 'plan_display', av: 'av0', show: false };
-  const events = [hide, { ...hide, name: 'b', show: true }, { name: 'c', kind: 'release' }];
-  const after = (...names) => {
-    plans.applyEvents({ events }, names.map((name) => ({ name })));
-    return [plans.shows('av0'), plans.shows('av1')];
-  };
-  assert.deepEqual([after(), after('a'), after('a', 'c'), after('a', 'b'), after('b', 'a')],
-    [[true, true], [false, true], [false, true], [true, true], [false, true]]);
-  plans.on = false;
-  assert.equal(plans.shows('av1'), false);
 });

@@ -23,7 +23,7 @@ beforeEach(() => {
   createTaskPanel(root, store, server);
 });
 
-const card = (name) => root.querySelector(`[data-task="${name}"]`);
+const card = (name) => root.querySelector(`.task-panel [data-name="${name}"]`);
 const button = (name) => card(name).querySelector('button');
 const press = (name) => click(button(name));
 const state = (name) => card(name).querySelector('.event-state').textContent;
@@ -35,7 +35,7 @@ const NONE = [false, false, false];
 
 test('each task has a card with its kind, its driver and its button, in the order of the game',
   () => {
-    assert.deepEqual([...root.querySelectorAll('[data-task]')].map(textOf), [
+    assert.deepEqual([...root.querySelectorAll('.task-panel [data-name]')].map(textOf), [
       'light Detection response Begin For the driver of hv0',
       'Road works Take-over request Ask For the driver of av0, 2.0 s ahead',
       '\u2068<b>Radio</b> \u202e1\u2069 Secondary task Begin For the driver of hv0']);
@@ -50,7 +50,7 @@ test('a game without tasks has no panel', () => {
   assert.equal(textOf(root), '');
   store.receive({ ...store.scene, tasks: TASKS.slice(0, 1) });
   assert.ok(!root.querySelector('.task-panel').hidden);
-  assert.equal(root.querySelectorAll('[data-task]').length, 1);
+  assert.equal(root.querySelectorAll('.task-panel [data-name]').length, 1);
 });
 
 test('a press triggers the task, and its button then ends it', async () => {

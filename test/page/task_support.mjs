@@ -4,7 +4,7 @@
 
 import { setImmediate as soon } from 'node:timers/promises';
 
-import { createTasks } from '../../page/cockpit/js/tasks/tasks.js';
+import { Tasks } from '../../page/cockpit/js/tasks/tasks.js';
 import { liveStore, openPage, Pictures, send, Server } from './dom_support.mjs';
 
 const TIMES = { shown_s: 1, latest_s: 2.5, lead_s: null, show: true, key: 'Enter', button: null };
@@ -70,7 +70,7 @@ export function begin(more) {
   root.replaceChildren();
   store = liveStore(VEHICLES, { tasks: [LIGHT, CALL, RADIO], ...more });
   store.round_trip_ms = 20;
-  createTasks(root, store, server);
+  new Tasks(root, store, server);
   run('running');
   seats({ hv0: MINE });
 }

@@ -8,7 +8,7 @@ import { test } from 'node:test';
 import { answeredBy, isTaken, keyName } from '../../page/cockpit/js/tasks/answers.js';
 import { Prompt } from '../../page/cockpit/js/tasks/prompt.js';
 import { RunningTime } from '../../page/cockpit/js/tasks/running_time.js';
-import { labelsOf, languageOf, wordsIn } from '../../page/cockpit/js/tasks/task_words.js';
+import { labelsOf, languageOf, WORDS } from '../../page/cockpit/js/driver_words.js';
 
 /** @import { GameTask } from '../../page/cockpit/js/tasks/task_messages.js' */
 
@@ -95,7 +95,8 @@ test('the language is that of the address, else of the game, else English', () =
   assert.equal(languageOf('?lang=de-AT', undefined), 'de');
   assert.equal(languageOf('?lang=xx', 'de'), 'de');
   assert.equal(languageOf('', 'fr'), 'en');
-  assert.deepEqual(Object.keys(wordsIn('de')), Object.keys(wordsIn('en')));
+  assert.equal(languageOf('?lang=xx', undefined), 'en');
+  assert.deepEqual(Object.keys(WORDS.de), Object.keys(WORDS.en));
 });
 
 test('the address has labels of tasks in the language of the driver, or none', () => {

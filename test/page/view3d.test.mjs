@@ -12,9 +12,9 @@ const { acrossAngle, heightAngle, readSeat, trueAngle } = await import(
 const { wantsHeadlights } = await import(`${VIEW}/headlights.js`);
 const { KeyAnswer } = await import(`${VIEW}/key_answer.js`);
 const { localOrigin } = await import(`${VIEW}/local_origin.js`);
-const { mirrorCamera, MIRRORS } = await import(`${VIEW}/mirror_optics.js`);
+const { mirrorCamera, MIRRORS } = await import(`${VIEW}/mirrors.js`);
 const { DETAILS, isSoftware, Quality } = await import(`${VIEW}/quality.js`);
-const { steeringOf } = await import(`${VIEW}/steering.js`);
+const { steeringOf } = await import(`${VIEW}/traffic.js`);
 const { isWithin } = await import(`${VIEW}/seen_instances.js`);
 const { readViewWindow } = await import(`${VIEW}/view_window.js`);
 const { MeshBuilder } = await import(`${VIEW}/bodies/mesh_builder.js`);
@@ -121,7 +121,7 @@ test('a camera is mounted in the turned and climbing vehicle', () => {
 
 test('chase is behind the vehicle, bird above it', () => {
   const stand = { x: 0, y: 0, z: 0, yaw: 0, slope: 0 };
-  assert.ok(chasing(stand, { rear: -1, front: 3.5 }).x < -5);
+  assert.ok(chasing(stand, -1).x < -5);
   const bird = above(stand);
   assert.ok(bird.z > 30);
   near(bird.pitch, -Math.PI / 2, 1e-9);

@@ -6,9 +6,7 @@ import type { Store } from './store.js';
 
 /** Return whether the person at this page drives a vehicle, or rides in an AV. */
 export function attends(store: Store, seat: string): boolean {
-  const { mode, me, seats } = store;
-  return mode === 'live' && me.id !== ''
-    && (seats[seat]?.holder === me.id || rides(store, seat));
+  return store.mode === 'live' && store.me.id !== '' && (store.holds(seat) || rides(store, seat));
 }
 
 /** Return whether the person rides in an AV that its planner drives. */

@@ -73,12 +73,7 @@ export class CriticalityLog {
     }
   }
 
-  /**
-   * Return a vehicle's values over time.
-   *
-   * @param index of the vehicle
-   * @returns NaN where nothing is near
-   */
+  /** Return a vehicle's values over time: NaN where nothing is near; `index` of the vehicle. */
   past(index: number, name: string): { t: number[]; values: number[] } {
     return {
       t: this.#frames.map((frame) => frame.t),
@@ -88,7 +83,6 @@ export class CriticalityLog {
 
   /**
    * Return a measure of a vehicle at a time.
-   *
    * @param t [s]
    * @param index of the vehicle
    * @returns null if nothing is near, or no measurement is recent
@@ -100,7 +94,6 @@ export class CriticalityLog {
 
   /**
    * Return the most critical value until a time.
-   *
    * @param t [s]
    * @param index of the vehicle
    * @returns null where there was none

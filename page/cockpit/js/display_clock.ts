@@ -23,10 +23,8 @@ const SETTLE_MS = 250;
 
 /** A map from wall time [ms] to the simulation time to show [s]. */
 export class DisplayClock {
-  #t = new Float64Array(WINDOW);
-  #at = new Float64Array(WINDOW);
-  #count = 0;
-  #next = 0;
+  // The last samples, the oldest first.
+  #arrivals: { t: number; at_ms: number }[] = [];
   #shown = NaN;
   #shownAt_ms = 0;
 
@@ -41,40 +39,32 @@ export class DisplayClock {
 
   /** Reset the clock: the next sample is shown at once. */
   reset() {
-    this.#count = 0;
-    this.#next = 0;
+    this.#arrivals = [];
     this.#shown = NaN;
   }
 
-  /**
-   * Record the arrival of a sample.
-   *
-   * @param t its simulation time [s]
-   * @param now_ms when it arrived
-   */
+  /** Record the arrival of a sample; `t`: its simulation time [s]; `now_ms`: when it arrived. */
   arrived(t: number, now_ms: number) {
-    const last = (this.#next + WINDOW - 1) % WINDOW;
-    if (this.#count > 0 && (now_ms - this.#at[last] > SILENCE_MS || t <= this.#t[last])) {
-      this.#count = 0;
-      this.#next = 0;
+    const last = this.#arrivals.at(-1);
+    if (last !== undefined && (now_ms - last.at_ms > SILENCE_MS || t <= last.t)) {
+      this.#arrivals = [];
     }
-    this.#t[this.#next] = t;
-    this.#at[this.#next] = now_ms;
-    this.#next = (this.#next + 1) % WINDOW;
-    this.#count = Math.min(this.#count + 1, WINDOW);
+    this.#arrivals.push({ t, at_ms: now_ms });
+    if (this.#arrivals.length > WINDOW) {
+      this.#arrivals.shift();
+    }
     this.#measure();
   }
 
   /**
    * Return the simulation time to show.
-   *
    * @param now_ms wall time of the frame, which never goes back
    * @param newest_t of the newest sample [s]
    * @param runs false while the simulation stands still
    * @returns simulation time [s]
    */
   time(now_ms: number, newest_t: number, runs: boolean): number {
-    if (!runs || this.#count === 0) {
+    if (!runs || this.#arrivals.length === 0) {
       this.#shown = newest_t;
     } else {
       const elapsed_ms = Math.max(now_ms - this.#shownAt_ms, 0);
@@ -94,26 +84,19 @@ export class DisplayClock {
   }
 
   #measure() {
-    const oldest = this.#count < WINDOW ? 0 : this.#next;
-    const newest = (this.#next + WINDOW - 1) % WINDOW;
-    const span_ms = this.#at[newest] - this.#at[oldest];
-    const enough = this.#count >= FEWEST && span_ms >= SHORTEST_SPAN_MS;
-    const measured = enough ? (this.#t[newest] - this.#t[oldest]) / span_ms * 1000 : this.factor;
+    const count = this.#arrivals.length;
+    const [oldest, newest] = [this.#arrivals[0], this.#arrivals[count - 1]];
+    const span_ms = newest.at_ms - oldest.at_ms;
+    const enough = count >= FEWEST && span_ms >= SHORTEST_SPAN_MS;
+    const measured = enough ? (newest.t - oldest.t) / span_ms * 1000 : this.factor;
     this.rate = Math.abs(measured / this.factor - 1) < STEADY ? this.factor : measured;
-    this.period_ms = this.#count > 1 ? span_ms / (this.#count - 1) : 10;
-    let lead = -Infinity;
-    for (let i = 0; i < this.#count; i += 1) {
-      lead = Math.max(lead, this.#t[i] - this.rate * this.#at[i] / 1000);
-    }
-    let sum = 0;
-    let squares = 0;
-    for (let i = 0; i < this.#count; i += 1) {
-      const late_ms = (lead + this.rate * this.#at[i] / 1000 - this.#t[i]) / this.rate * 1000;
-      sum += late_ms;
-      squares += late_ms * late_ms;
-    }
-    const mean = sum / this.#count;
-    const deviation = Math.sqrt(Math.max(squares / this.#count - mean * mean, 0));
+    this.period_ms = count > 1 ? span_ms / (count - 1) : 10;
+    const leads = this.#arrivals.map(({ t, at_ms }) => t - this.rate * at_ms / 1000);
+    const lead = Math.max(...leads);
+    const late_ms = leads.map((each) => (lead - each) / this.rate * 1000);
+    const mean = late_ms.reduce((sum, each) => sum + each, 0) / count;
+    const squares = late_ms.reduce((sum, each) => sum + each * each, 0);
+    const deviation = Math.sqrt(Math.max(squares / count - mean * mean, 0));
     this.#lead = lead;
     this.jitter_ms = Math.min(mean + 2 * deviation, MAX_JITTER_MS);
     this.delay_ms = this.period_ms + this.jitter_ms + GUARD_MS;

@@ -12,7 +12,6 @@ export type Attributes = { text?: string; on?: Listeners }
 
 /**
  * Make an HTML element.
- *
  * @param tag name of the element.
  * @param attributes `class`, `text`, `on` (listeners by event name) and attributes; true gives an
  *   empty attribute, false, null and undefined none.
@@ -47,7 +46,6 @@ function fill<Filled extends Element>(node: Filled, { text, on, ...attributes }:
 
 /**
  * Find the element with an id in, or at, a root.
- *
  * @throws {Error} if the page has none.
  */
 export function part(root: HTMLElement, id: string): HTMLElement {
@@ -68,7 +66,6 @@ export function setText(node: Element, text: string) {
 
 /**
  * Set or remove an attribute only when it changed.
- *
  * @param value true gives an empty attribute, false and null remove it.
  */
 export function setAttribute(node: Element, name: string, value: string | boolean | null) {

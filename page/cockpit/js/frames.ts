@@ -106,8 +106,6 @@ export type ReadRows = (from: number, count: number, width: number) => Float64Ar
 
 /**
  * Read one frame without copying its values.
- *
- * @param buffer the frame
  * @returns null for an unknown kind
  * @throws {RangeError} if the frame is shorter than its header says
  */

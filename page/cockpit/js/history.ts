@@ -17,7 +17,6 @@ export function emptyHistory(): History {
 
 /**
  * Add a vehicle's values of a sample.
- *
  * @param past to which they are appended
  * @param sample rows of all vehicles
  * @param index of the vehicle

@@ -8,7 +8,6 @@ const TURN = 2 * Math.PI;
 
 /**
  * Interpolate from one angle to another by the shortest way.
- *
  * @param from [rad]
  * @param to [rad]
  * @param share 0 gives `from`, 1 the direction of `to`
@@ -21,7 +20,6 @@ export function turn(from: number, to: number, share: number): number {
 
 /**
  * Interpolate all vehicles linearly between two samples.
- *
  * @param out rows of VEHICLE_WIDTH, written
  * @param before the sample at or before the time
  * @param after the sample after it
@@ -44,7 +42,6 @@ export function interpolateVehicles(out: Float64Array, before: Float64Array, aft
 
 /**
  * Extrapolate all vehicles from a sample with their speeds and yaw rates.
- *
  * @param out rows of VEHICLE_WIDTH, written
  * @param sample the newest rows
  * @param dt since the sample [s]
@@ -62,7 +59,6 @@ export function extrapolateVehicles(out: Float64Array, sample: Float64Array, dt:
 
 /**
  * Extrapolate all objects from their scenario step: pose + velocity * dt, velocities unchanged.
- *
  * @param out rows of OBJECT_WIDTH, written
  * @param sample rows at the step
  * @param dt since the step [s]

@@ -10,12 +10,16 @@ export const LIGHT_BUTTONS = [
   'left_indicator', 'right_indicator', 'hazard', 'horn',
 ] as const;
 
+/** The lit lamps of a traffic light in each state. */
+export const LIT: Record<string, readonly string[] | undefined> = {
+  red: ['red'], redYellow: ['red', 'yellow'], yellow: ['yellow'], green: ['green'],
+};
+
 const BLINKS_PER_S = 1.5;
 const FLASHES_PER_S = 2;
 
 /**
  * Return the lights that are lit at a time: some blink in simulation time.
- *
  * @param lights bits; undefined means none
  * @param t simulation time [s]
  */

@@ -4,13 +4,14 @@
 
 import { element, setAttribute, setText } from './dom.js';
 import { describeSeat } from './driving/seat_text.js';
+import { tellRefusal } from './rights.js';
 
 import type { Connection } from './connection.js';
 import type { RequestMessage, Seat } from './messages.js';
 import type { Store } from './store.js';
 
 /** The lobby in the Drive panel and the countdown on the stage. */
-class Lobby {
+export class Lobby {
   #store;
   #connection;
   #list = element('ul', { class: 'lobby-seats' });
@@ -32,10 +33,7 @@ class Lobby {
     this.#connection = connection;
     stage.append(this.#countdown);
     document.querySelector('#panel-drive')?.prepend(this.#section);
-    for (const event of ['hello', 'you', 'seats', 'status',
-      'connection'] as const) {
-      store.on(event, () => this.#show());
-    }
+    store.on(['hello', 'you', 'seats', 'status', 'connection'], () => this.#show());
     this.#show();
   }
 
@@ -47,8 +45,7 @@ class Lobby {
 
   /** @returns the seat that this page holds */
   get #mine(): string | undefined {
-    const { me } = this.#store;
-    return this.#seats.find(([, { holder }]) => holder === me.id && me.id !== '')?.[0];
+    return this.#seats.find(([id]) => this.#store.holds(id))?.[0];
   }
 
   #show() {
@@ -92,15 +89,7 @@ class Lobby {
     }
   }
 
-  async #request(message: RequestMessage) {
-    const { ok, text } = await this.#connection.request(message);
-    if (!ok) {
-      this.#store.receive({ type: 'notice', level: 'warn', text });
-    }
+  #request(message: RequestMessage) {
+    return tellRefusal(this.#store, this.#connection.request(message));
   }
-}
-
-/** Put the lobby into the Drive panel and the countdown over the picture. */
-export function createLobby(stage: HTMLElement, store: Store, connection: Connection): Lobby {
-  return new Lobby(stage, store, connection);
 }

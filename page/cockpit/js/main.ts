@@ -8,7 +8,7 @@ import { PARTS, STAGE } from './parts.js';
 import { readStage } from './stage/stage_address.js';
 import { Store } from './store.js';
 import { driverSight } from './world/driver_sight.js';
-import { createWorld } from './world/world.js';
+import { World } from './world/world.js';
 
 const bare = readStage(window.location.search) !== null;
 document.documentElement.classList.toggle('bare', bare);
@@ -17,7 +17,7 @@ const parts = bare ? [['./stage/stage.js', 'createStage', '#stage', 'stage'],
 addPanels(document.querySelector('#panels') as HTMLElement);
 const store = new Store();
 const connection = new Connection(store);
-const world = createWorld(
+const world = new World(
   document.querySelector('#world') as HTMLCanvasElement, store,
   { connection, covered: document.querySelector('#hud'), keys: !bare, toolbar: !bare,
     sight: () => driverSight(store) });
@@ -29,10 +29,11 @@ for (const module of modules) {
   // Told below, when it is its turn.
   module.catch(() => {});
 }
-for (const [i, [path, create, root, name]] of parts.entries()) {
+for (const [i, [path, make, root, name]] of parts.entries()) {
   try {
     const module = await modules[i];
-    window.crgame[name] = module[create](document.querySelector(root), store, connection);
+    // A class, or a function, whose object `new` returns as well.
+    window.crgame[name] = new module[make](document.querySelector(root), store, connection);
   } catch (error) {
     console.error(`${path}: ${error}`);
     const text = `${path} failed: ${error instanceof Error ? error.message : error}`;

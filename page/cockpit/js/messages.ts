@@ -3,13 +3,12 @@
 /**
  * Types of the JSON messages between the page and its server: no code here.
  *
- * The server's side is crgame_ros/cockpit/scene.py, run_status.py, seat_table.py,
+ * The server's side is crgame_ros/cockpit/scene.py, hub.py, run_status.py, seat_table.py,
  * runs/archive.py, replay_backend.py and, for the page's messages, page_messages.py. The
  * binary frames are in frames.ts. Polylines and polygons are flat lists x0, y0, x1, y1, … [m].
  */
 
 import type { Control, Input, PageMessage, Role, SeenView, Unnumbered } from './page_messages.js';
-import type { PeopleMessage, Rights, YouMessage } from './people_messages.js';
 import type { GameTask, TasksMessage } from './tasks/task_messages.js';
 
 export type Box = [xmin: number, ymin: number, xmax: number, ymax: number]; // [m]
@@ -341,3 +340,36 @@ export type Hands = Omit<Input, 'type' | 'seat'>;
 export type RunAction = Control['action'];
 export type ViewMessage = SeenView;
 export type RoleName = Role['role'];
+
+/** The rights of this page: `directs` and `drives` are in use, `may_…` are granted. */
+export interface Rights {
+  role: string;
+  directs: boolean;
+  drives: boolean;
+  seat: string;
+  may_direct: boolean;
+  may_drive: boolean;
+}
+
+/** A person at a page. */
+export interface Present {
+  client: string;
+  name: string;
+  role: string;
+  seat: string | null;
+  away: boolean; // whether the controls are released
+  round_trip_ms: number | null;
+  input_delay_ms: number | null; // from an input to the visible answer, at the page
+}
+
+/** A device at the machine of the game that drives. */
+export interface DeviceDelay {
+  seat: string;
+  device: string; // its name
+  command_ms: number | null; // from the kernel's stamp of an input to its command
+  input_delay_ms: number | null; // to the first state that obeys it
+}
+
+// `accepted`: whether the server has recognised the page by its key.
+export interface YouMessage { type: 'you'; rights: Rights; accepted: boolean }
+export interface PeopleMessage { type: 'people'; people: Present[]; devices: DeviceDelay[] }

@@ -4,7 +4,6 @@
 
 /**
  * Return the outline of a lanelet: its left bound, then its right one reversed.
- *
  * @param lanelet with flat bounds
  * @returns flat polygon
  */
@@ -16,10 +15,7 @@ export function outlineOf({ left, right }: { left: number[]; right: number[] }):
   return outline;
 }
 
-/**
- * @param points flat
- * @returns xmin, ymin, xmax, ymax
- */
+/** Return xmin, ymin, xmax, ymax; `points`: flat. */
 export function boxOf(points: number[]): [number, number, number, number] {
   const box: [number, number, number, number] = [Infinity, Infinity, -Infinity, -Infinity];
   for (let i = 0; i < points.length; i += 2) {
@@ -31,13 +27,7 @@ export function boxOf(points: number[]): [number, number, number, number] {
   return box;
 }
 
-/**
- * Return whether a point is within a polygon.
- *
- * @param ring flat polygon
- * @param x [m]
- * @param y [m]
- */
+/** Return whether a point is within a polygon; `ring`: flat polygon; `x` [m]; `y` [m]. */
 export function contains(ring: number[], x: number, y: number) {
   let inside = false;
   for (let i = 0, j = ring.length - 2; i < ring.length; j = i, i += 2) {

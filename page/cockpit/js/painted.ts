@@ -5,7 +5,6 @@
 /**
  * Wait until the present animation frame has been painted: the browser runs a message that is sent
  * in a frame after it has painted that frame.
- *
  * @returns when, by performance.now
  */
 export function painted(): Promise<number> {

@@ -17,18 +17,18 @@ export const PANELS: { name: string; label: string; saves?: ('plots' | 'tables')
   { name: 'runs', label: 'Runs' },
 ];
 
-// [module, its create function, selector of its root, name in window.crgame]. They begin one by
+// [module, its class or function, selector of its root, name in window.crgame]. They begin one by
 // one, so that a part that cannot be loaded is named on the page and the others still work.
 export const PARTS = [
   ['./panels/notices.js', 'createNotices', '#notices', 'notices'],
-  ['./person.js', 'createPerson', 'body', 'person'],
+  ['./person.js', 'Person', 'body', 'person'],
   ['./driving/driving.js', 'createDriving', '#hud', 'driving'],
-  ['./tasks/tasks.js', 'createTasks', '#stage', 'tasks'],
-  ['./lobby.js', 'createLobby', '#stage', 'lobby'],
-  ['./people.js', 'createPeople', '#panel-drive', 'people'],
-  ['./run_control.js', 'createRunControl', '#bar', 'runControl'],
+  ['./tasks/tasks.js', 'Tasks', '#stage', 'tasks'],
+  ['./lobby.js', 'Lobby', '#stage', 'lobby'],
+  ['./people.js', 'People', '#panel-drive', 'people'],
+  ['./run_control.js', 'RunControl', '#bar', 'runControl'],
   ['./panels/settings.js', 'createSettings', '#bar-end', 'settings'],
-  ['./sound/sound.js', 'createSound', '#bar-end', 'sound'],
+  ['./sound/sound.js', 'Sound', '#bar-end', 'sound'],
   ['./panels/title.js', 'createTitle', '#title', 'title'],
   ['./panels/alarms.js', 'createAlarms', '#alarms', 'alarms'],
   ['./panels/tabs.js', 'createTabs', '#panels', 'panels'],
@@ -37,18 +37,18 @@ export const PARTS = [
   ['./tasks/task_panel.js', 'createTaskPanel', '#panel-events', 'taskPanel'],
   ['./panels/planners.js', 'createPlanners', '#panel-timing', 'planners'],
   ['./panels/timing.js', 'createTiming', '#panel-timing', 'timing'],
-  ['./after/instant_replay.js', 'createInstantReplay', '#last-seconds', 'lastSeconds'],
+  ['./after/instant_replay.js', 'InstantReplay', '#last-seconds', 'lastSeconds'],
   ['./after/restart_key.js', 'createRestart', '#stage', 'restart'],
-  ['./after/run_list.js', 'createRunList', '#panel-runs', 'runs'],
-  ['./panels/outcome.js', 'createOutcome', '#outcome', 'outcome'],
+  ['./after/run_list.js', 'RunList', '#panel-runs', 'runs'],
+  ['./panels/outcome.js', 'Outcome', '#outcome', 'outcome'],
   ['./panels/history.js', 'createHistory', '#panel-history', 'history'],
   ['./panels/criticality_panel.js', 'createCriticality', '#panel-criticality', 'criticality'],
   ['./perception/perception.js', 'createPerception', '#stage', 'perception'],
-  ['./view3d/view3d.js', 'createView3d', '#stage', 'view3d'],
-  ['./view_report.js', 'createViewReport', '#stage', 'viewReport'],
+  ['./view3d/view3d.js', 'View3d', '#stage', 'view3d'],
+  ['./view_report.js', 'ViewReport', '#stage', 'viewReport'],
   ['./world/around.js', 'createAround', '#around', 'around'],
   ['./panels/save_panel.js', 'createSaving', '#panels', 'saving'],
-  ['./replay/player.js', 'createReplay', '#timeline', 'replay'],
+  ['./replay/player.js', 'Player', '#timeline', 'replay'],
 ];
 // Parts of a stage, for a person that only drives; names of missing parts are ignored.
 export const STAGE = ['person', 'driving', 'tasks', 'lobby', 'sound', 'view3d', 'viewReport'];

@@ -6,10 +6,10 @@ import { element, setAttribute, setText } from './dom.js';
 import { oneLine } from './panels/format.js';
 import { session } from './panels/memory.js';
 import { post } from './panels/scenario_api.js';
+import { tellRefusal } from './rights.js';
 
 import type { Connection } from './connection.js';
-import type { DeviceDelay, Present } from './people_messages.js';
-import type { RoleName } from './messages.js';
+import type { DeviceDelay, Present, RoleName } from './messages.js';
 import type { Store } from './store.js';
 
 const ROLES: [role: string, text: string][] = [['all', 'Director and driver'],
@@ -18,7 +18,7 @@ const ROLES: [role: string, text: string][] = [['all', 'Director and driver'],
 const ROLE = 'crgame.role';
 
 /** The section of the Drive panel. */
-class People {
+export class People {
   #store;
   #connection;
   #list = element('ul', { class: 'people' });
@@ -45,12 +45,10 @@ class People {
     element('h2', { id: 'people-title', text: 'People' }), this.#roleRow, this.#list,
     this.#invite);
     root.append(section);
-    for (const event of ['hello', 'you', 'people', 'scene'] as const) {
-      store.on(event, () => {
-        setAttribute(section, 'hidden', store.mode === 'replay');
-        this.#show();
-      });
-    }
+    store.on(['hello', 'you', 'people', 'scene'], () => {
+      setAttribute(section, 'hidden', store.mode === 'replay');
+      this.#show();
+    });
     store.on('hello', () => this.#chooseAgain());
     this.#chooseAgain();
     this.#show();
@@ -111,10 +109,8 @@ class People {
   }
 
   async #requestRole(role: RoleName) {
-    const { ok, text } = await this.#connection.request({ type: 'role', role });
-    if (!ok) {
+    if (!await tellRefusal(this.#store, this.#connection.request({ type: 'role', role }))) {
       this.#refused = role;
-      this.#store.receive({ type: 'notice', level: 'warn', text });
     }
   }
 
@@ -142,13 +138,4 @@ function deviceRow({ seat, device, command_ms, input_delay_ms }: DeviceDelay) {
   return element('li', { 'data-device': seat }, element('strong', { text: oneLine(device) }),
     element('span', { text: `drives ${seat} at the machine of the game` }),
     element('span', { class: 'drive-note', text: delays }));
-}
-
-/**
- * Put the list of people into the Drive panel.
- *
- * @param root the panel
- */
-export function createPeople(root: HTMLElement, store: Store, connection: Connection): People {
-  return new People(root, store, connection);
 }

@@ -41,11 +41,7 @@ export class Perceived {
   #estimates = new Map<number, SampleRing<EstimateFrame>>();
   #scans = new Map<string, ScanFrame>();
 
-  /**
-   * Add a frame of one of these kinds.
-   *
-   * @param frame decoded frame
-   */
+  /** Add a frame of one of these kinds; `frame`: decoded frame. */
   add(frame: PerceptionFrame) {
     switch (frame.kind) {
       case KIND.SEEN: this.#seen.set(frame.index, frame); break;
@@ -70,7 +66,6 @@ export class Perceived {
 
   /**
    * Return the objects that an AV's planner has been told of.
-   *
    * @param av index of the AV
    * @param t time that is shown [s]
    * @returns columns: vehicles, then objects; null while unknown
@@ -83,7 +78,6 @@ export class Perceived {
 
   /**
    * Return the estimated pose of an AV: the last estimate, extrapolated.
-   *
    * @param av index of the AV
    * @param t time that is shown [s]
    */
@@ -106,7 +100,6 @@ export class Perceived {
 
   /**
    * Return the newest scan of each sensor of an AV that is not too old.
-   *
    * @param av index of the AV
    * @param t time that is shown [s]
    */

@@ -10,7 +10,7 @@ import type { Store } from './store.js';
 const KEY = 'crgame.key';
 
 /** The key of this tab, and of its successor after it has been closed. */
-class Person {
+export class Person {
   #connection;
   // The address of a stage may carry the key of its driver, whatever the browser.
   #given = givenKey();
@@ -18,7 +18,7 @@ class Person {
   #fresh = this.#given === null && session.get(KEY) === null;
   #key = this.#given ?? session.get(KEY) ?? local.get(KEY) ?? newKey();
 
-  constructor(store: Store, connection: Connection) {
+  constructor(_: HTMLElement, store: Store, connection: Connection) {
     this.#connection = connection;
     store.on('hello', () => this.#introduce());
     store.on('you', ({ accepted }) => accepted || this.#beAnother());
@@ -61,13 +61,4 @@ function givenKey(): string | null {
 function newKey() {
   return [...crypto.getRandomValues(new Uint8Array(16))]
     .map((byte) => byte.toString(16).padStart(2, '0')).join('');
-}
-
-/**
- * Identify this page to the server at each connection.
- *
- * @param _ no part of the page
- */
-export function createPerson(_: HTMLElement, store: Store, connection: Connection): Person {
-  return new Person(store, connection);
 }

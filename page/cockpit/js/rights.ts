@@ -2,12 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Reasons, in words, why a person may not use a control of this page. */
 
-import type { RunAction } from './messages.js';
+import type { Reply, RunAction } from './messages.js';
 import type { Store } from './store.js';
 
 /**
  * Return why an action is not allowed here; the server checks it too.
- *
  * @param right that it needs
  * @param deed as in 'reset the run'
  * @returns empty if it may be done
@@ -22,13 +21,11 @@ export function reasonAgainst(store: Store, right: 'direct' | 'drive', deed: str
 
 /**
  * Return why an order is not allowed; a driver in the seat uses start to report ready.
- *
  * @returns empty if it can
  */
 export function reasonAgainstOrder(store: Store, action: RunAction): string {
-  const { seats, me, status, rights } = store;
-  const seated = Object.values(seats).some(({ holder }) => holder === me.id && me.id !== '');
-  if (action === 'start' && seated && status?.n === 0 && rights.drives) {
+  const { status, rights } = store;
+  if (action === 'start' && store.own.length > 0 && status?.n === 0 && rights.drives) {
     return '';
   }
   return reasonAgainst(store, 'direct', `${action} the run`);
@@ -36,7 +33,6 @@ export function reasonAgainstOrder(store: Store, action: RunAction): string {
 
 /**
  * Return why this person cannot act on a seat.
- *
  * @param id of a seat that there is
  * @returns empty if they can
  */
@@ -46,4 +42,13 @@ export function reasonAgainstSeat(store: Store, id: string): string {
   return reasonAgainst(store, 'drive', 'take a seat')
     || (rights.seat === '' || rights.seat === id || mine ? ''
       : `Your link is for ${rights.seat}; the driver of ${id} can offer it to you.`);
+}
+
+/** Show the refusal of a request as a notice; return whether there was none. */
+export async function tellRefusal(store: Store, reply: Promise<Reply>): Promise<boolean> {
+  const { ok, text } = await reply;
+  if (!ok) {
+    store.receive({ type: 'notice', level: 'warn', text });
+  }
+  return ok;
 }

@@ -3,10 +3,10 @@
 /** The run in the header: start, pause, step, reset, stop, speed of time, clock, recording. */
 
 import { element, part, setAttribute, setText } from './dom.js';
-import { isTyping } from './driving/focus.js';
+import { isCommand } from './driving/focus.js';
 import { icon } from './driving/icons.js';
 import { confirm } from './panels/confirm.js';
-import { reasonAgainst, reasonAgainstOrder } from './rights.js';
+import { reasonAgainst, reasonAgainstOrder, tellRefusal } from './rights.js';
 
 import type { Connection } from './connection.js';
 import type { Recording, RequestMessage, RunAction, Status } from './messages.js';
@@ -41,7 +41,7 @@ const RUN_TEXTS: Record<string, string> = {
 };
 
 /** The run control; one per page. */
-class RunControl {
+export class RunControl {
   #store;
   #connection;
   #buttons = {} as Record<RunAction, HTMLButtonElement>;
@@ -69,10 +69,7 @@ class RunControl {
     this.#root.append(...Object.values(this.#buttons),
       element('label', { class: 'run-factor' }, element('span', { text: 'Speed' }), this.#factor));
     window.addEventListener('keydown', (event) => this.#key(event));
-    for (const name of ['hello', 'you', 'status', 'connection',
-      'seats'] as const) {
-      store.on(name, () => this.#show());
-    }
+    store.on(['hello', 'you', 'status', 'connection', 'seats'], () => this.#show());
     this.#show();
   }
 
@@ -126,16 +123,12 @@ class RunControl {
     }
   }
 
-  async #request(message: RequestMessage) {
-    const { ok, text } = await this.#connection.request(message);
-    if (!ok) {
-      this.#store.receive({ type: 'notice', level: 'warn', text });
-    }
+  #request(message: RequestMessage) {
+    return tellRefusal(this.#store, this.#connection.request(message));
   }
 
   #key(event: KeyboardEvent) {
-    if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)
-        || document.querySelector('dialog[open]') || this.#root.hidden
+    if (event.repeat || !isCommand(event) || this.#root.hidden
         // A driver may press a key by mistake; only a director controls the experiment.
         || reasonAgainst(this.#store, 'direct', 'pause') !== '') {
       return;
@@ -195,14 +188,4 @@ function recordingNow({ recording, run }: Status, connected: boolean): Recording
   }
   return run !== 'ended' ? { state: 'unknown' }
     : { ...told, state: told.state === 'recording' ? 'recorded' : told.state };
-}
-
-/**
- * Put the run control, the clock and the recording lamp into the header.
- *
- * @param root the header
- */
-export function createRunControl(root: HTMLElement, store: Store,
-  connection: Connection): RunControl {
-  return new RunControl(root, store, connection);
 }

@@ -6,9 +6,8 @@ import { countWhile } from './search.js';
 
 /** Samples {n, t, …}, oldest first; a new one beyond the capacity replaces the oldest. */
 export class SampleRing<Sample extends { n: number; t: number }> {
-  #items: (Sample | undefined)[];
-  #start = 0;
-  #length = 0;
+  #items: Sample[] = [];
+  #capacity;
   #spacing_s;
 
   /**
@@ -16,79 +15,57 @@ export class SampleRing<Sample extends { n: number; t: number }> {
    * @param spacing_s samples that follow within this time are left out [s]
    */
   constructor(capacity: number, spacing_s = 0) {
-    this.#items = new Array(capacity);
+    this.#capacity = capacity;
     this.#spacing_s = spacing_s;
   }
 
   /** Return how many samples there are. */
   get length() {
-    return this.#length;
+    return this.#items.length;
   }
 
   /** Return the newest sample, undefined if there is none. */
   get newest() {
-    return this.at(this.#length - 1);
+    return this.#items.at(-1);
   }
 
-  /**
-   * @param index 0 is the oldest
-   * @returns the sample
-   */
+  /** Return a sample, undefined if there is none; 0 is the oldest. */
   at(index: number): Sample | undefined {
-    return index < 0 || index >= this.#length ? undefined
-      : this.#items[(this.#start + index) % this.#items.length];
+    return this.#items[index];
   }
 
   /**
-   * Add a sample; one of the newest sample's step replaces it.
-   *
-   * @param sample with n and t
+   * Add a sample, which has n and t; one of the newest sample's step replaces it.
    * @returns false for a sample that is too old or too close
    */
   push(sample: Sample): boolean {
-    const newest = this.newest;
-    if (newest !== undefined) {
-      if (sample.n === newest.n) {
-        this.#items[(this.#start + this.#length - 1) % this.#items.length] = sample;
-        return true;
-      }
-      if (sample.t < newest.t + this.#spacing_s - 1e-9) {
-        return false;
-      }
+    const { newest } = this;
+    if (newest !== undefined && sample.n !== newest.n
+        && sample.t < newest.t + this.#spacing_s - 1e-9) {
+      return false;
     }
-    if (this.#length < this.#items.length) {
-      this.#length += 1;
-    } else {
-      this.#start = (this.#start + 1) % this.#items.length;
+    if (sample.n === newest?.n) {
+      this.#items.pop();
     }
-    this.#items[(this.#start + this.#length - 1) % this.#items.length] = sample;
+    this.#items.push(sample);
+    if (this.#items.length > this.#capacity) {
+      this.#items.shift();
+    }
     return true;
   }
 
   /** Remove all samples. */
   clear() {
-    this.#items.fill(undefined);
-    this.#start = 0;
-    this.#length = 0;
+    this.#items = [];
   }
 
-  /**
-   * Find the last sample at or before a time.
-   *
-   * @param t simulation time [s]
-   * @returns its index, -1 when all are later
-   */
+  /** Return the index of the last sample at or before a time [s], -1 when all are later. */
   indexAt(t: number): number {
-    return countWhile(this.#length, (index) => this.#kept(index).t <= t) - 1;
+    return countWhile(this.#items.length, (index) => this.#items[index].t <= t) - 1;
   }
 
   /** Return all samples, oldest first, in a new array. */
   toArray() {
-    return Array.from({ length: this.#length }, (_, index) => this.#kept(index));
-  }
-
-  /** @param index of a sample that is there */
-  #kept(index: number): Sample {
-    return this.at(index) as Sample;
+    return [...this.#items];
   }
 }

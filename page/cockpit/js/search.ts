@@ -4,7 +4,6 @@
 
 /**
  * Count the items at the beginning of an ordered list that satisfy a condition.
- *
  * @param length of the list
  * @param holds true up to some place and false from there on
  * @returns index of the first item for which it is false

@@ -3,9 +3,9 @@
 /** The seats in the Drive panel: their drivers, and taking and handing over a seat. */
 
 import { element, setAttribute, setText } from './dom.js';
-import { NameField } from './driving/name_field.js';
+import { nameField } from './driving/name_field.js';
 import { describeSeat } from './driving/seat_text.js';
-import { reasonAgainstSeat } from './rights.js';
+import { reasonAgainstSeat, tellRefusal } from './rights.js';
 
 import type { Connection } from './connection.js';
 import type { Driving } from './driving/driving.js';
@@ -31,7 +31,7 @@ export interface Facts {
 }
 
 /** The list of seats, with the name field above and the input devices below. */
-class Seats {
+export class Seats {
   #store;
   #connection;
   #driving;
@@ -52,17 +52,14 @@ class Seats {
       element('h2', { id: 'seats-title', text: 'Seats' }), this.#news, this.#list);
     const replay = element('p', { class: 'drive-note', hidden: true,
       text: 'This is a recording: its seats cannot be taken. Click a vehicle to follow it.' });
-    const name = new NameField(store, connection).node;
-    this.#live = [name, seats, driving.devices];
+    this.#live = [nameField(store, connection), seats, driving.devices];
     this.#replay = replay;
     root.append(replay, ...this.#live);
     store.on('seats', () => {
       this.#stale = false;
       this.#show();
     });
-    for (const event of ['hello', 'you', 'scene', 'status'] as const) {
-      store.on(event, () => this.#show());
-    }
+    store.on(['hello', 'you', 'scene', 'status'], () => this.#show());
     store.on('connection', (connected) => connected || this.#disconnected());
     this.#show();
   }
@@ -99,7 +96,7 @@ class Seats {
     const seat = seats[id];
     const role = scene?.vehicles.find((vehicle) => vehicle.id === id)?.role ?? 'human';
     return {
-      id, role, connected, mine: connected && seat.holder === me.id && me.id !== '',
+      id, role, connected, mine: connected && this.#store.holds(id),
       holder: seat.holder,
       // A seat that the game assigns to a cockpit cannot be given back to another driver.
       left: seat.holder === null && seat.source === 'cockpit' && seat.driver !== 'cockpit'
@@ -206,19 +203,15 @@ class Seats {
     return this.#connection.request(message);
   }
 
-  async #report(reply: Promise<Reply>) {
-    const { ok, text } = await reply;
-    if (!ok) {
-      this.#store.receive({ type: 'notice', level: 'warn', text });
-    }
+  #report(reply: Promise<Reply>) {
+    return tellRefusal(this.#store, reply);
   }
 
   #disconnected() {
     if (this.#stale) {
       return;
     }
-    const { seats, me } = this.#store;
-    const lost = Object.keys(seats).filter((id) => seats[id].holder === me.id && me.id !== '');
+    const lost = this.#store.own;
     this.#stale = true;
     this.#before = {};
     setText(this.#news, lost.length > 0
@@ -246,14 +239,4 @@ class Seats {
       }
     }
   }
-}
-
-/**
- * Put the seats into the Drive panel.
- *
- * @param root the panel
- */
-export function createSeats(root: HTMLElement, store: Store, connection: Connection,
-  driving: Driving): Seats {
-  return new Seats(root, store, connection, driving);
 }

@@ -16,7 +16,6 @@ export class ServerClock {
 
   /**
    * Add a ping with its pong.
-   *
    * @param sent_ms by performance.now
    * @param received_ms likewise
    * @param steady_s the server's clock when it answered
@@ -38,10 +37,7 @@ export class ServerClock {
     this.#exchanges = [];
   }
 
-  /**
-   * @param now_ms by performance.now
-   * @returns null before the first exchange
-   */
+  /** Return null before the first exchange; `now_ms` by performance.now. */
   at(now_ms: number): ServerTime | null {
     const best = this.#exchanges.reduce<Exchange | null>((least, each) => (
       least === null || each.round_trip_ms <= least.round_trip_ms ? each : least), null);

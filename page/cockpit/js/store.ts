@@ -6,23 +6,21 @@ import { CriticalityLog } from './criticality.js';
 import { DisplayClock } from './display_clock.js';
 import { decodeFrame, KIND } from './frames.js';
 import { addToHistory, emptyHistory } from './history.js';
-import { ServerClock } from './server_clock.js';
 import { extrapolateVehicles, interpolateVehicles, moveObjects } from './interpolation.js';
 import { Perceived } from './perceived.js';
 import { SampleRing } from './samples.js';
+import { ServerClock } from './server_clock.js';
 
 import type {
   CriticalityFrame, ObjectsFrame, PerceptionFrame, PlanFrame, PredictionFrame, StateFrame,
 } from './frames.js';
 import type { History } from './history.js';
 import type {
-  Alarm, AlarmsMessage, EventsMessage, Exposure, FilesMessage, FiredEvent, HelloMessage, Measure,
-  NoticeMessage, Scene, SceneMessage, Seat, SeatsMessage, SignalsMessage, Status, StatusMessage,
-  StoreMessage,
+  Alarm, AlarmsMessage, DeviceDelay, EventsMessage, Exposure, FilesMessage, FiredEvent,
+  HelloMessage, Measure, NoticeMessage, PeopleMessage, Present, Rights, RunState, Scene,
+  SceneMessage, Seat, SeatsMessage, SignalsMessage, Status, StatusMessage, StoreMessage,
+  YouMessage,
 } from './messages.js';
-import type {
-  DeviceDelay, PeopleMessage, Present, Rights, YouMessage,
-} from './people_messages.js';
 import type { TasksMessage } from './tasks/task_messages.js';
 
 // Samples for a replay of the last 10 s: states at 100 Hz, and scenario steps at up to 25 Hz.
@@ -54,6 +52,7 @@ export interface StoreEvents {
   events: EventsMessage;
   tasks: TasksMessage;
   status: StatusMessage;
+  run: RunState; // when it is another than in the status before
   alarms: AlarmsMessage;
   files: FilesMessage;
   notice: NoticeMessage;
@@ -85,7 +84,6 @@ export class Store {
   rights: Rights = { role: '', directs: false, drives: false, seat: '', may_direct: false,
     may_drive: false };
   mode: HelloMessage['mode'] | null = null;
-  version = '';
   /** Origins of the only pages that may frame this one. */
   framedBy: string[] = [];
   connected = false;
@@ -122,30 +120,27 @@ export class Store {
   #historySource: HistorySource | null = null;
 
   /**
-   * Listen to an event.
-   *
-   * @param name of the event
+   * Listen to one or several events.
    * @param listener called after the store has stored the content
    * @returns ends it
    */
-  on<Name extends keyof StoreEvents>(name: Name,
+  on<Name extends keyof StoreEvents>(names: Name | Name[],
     listener: (content: StoreEvents[Name]) => void): () => void {
-    const listeners = this.#listeners.get(name) ?? new Set();
-    this.#listeners.set(name, listeners.add(listener));
-    return () => listeners.delete(listener);
+    const sets = [names].flat().map((name) => {
+      const listeners = this.#listeners.get(name) ?? new Set();
+      this.#listeners.set(name, listeners.add(listener));
+      return listeners;
+    });
+    return () => sets.forEach((listeners) => listeners.delete(listener));
   }
 
-  /**
-   * Store a document or an event of the server.
-   *
-   * @param message with its `type`
-   */
+  /** Store a document or an event of the server. */
   receive(message: StoreMessage) {
+    const before = this.status?.run;
     switch (message.type) {
       case 'hello':
         this.me = { id: message.client, name: message.name };
         this.mode = message.mode;
-        this.version = message.version;
         this.framedBy = (message.framed_by ?? '').split(' ').filter(Boolean);
         this.measures = message.measures ?? [];
         this.exposures = message.exposures ?? [];
@@ -178,14 +173,12 @@ export class Store {
       default:
     }
     this.#emit(message.type, message);
+    if (message.type === 'status' && message.run !== before) {
+      this.#emit('run', message.run);
+    }
   }
 
-  /**
-   * Store a binary frame; one of an earlier epoch is dropped.
-   *
-   * @param buffer the frame
-   * @param now_ms when it arrived
-   */
+  /** Store a binary frame; one of an earlier epoch is dropped; `now_ms`: when it arrived. */
   receiveFrame(buffer: ArrayBuffer, now_ms: number) {
     const frame = decodeFrame(buffer);
     if (frame === null || (frame.epoch < this.epoch && !this.#fresh)) {
@@ -215,11 +208,7 @@ export class Store {
     }
   }
 
-  /**
-   * Remove all samples, for a reset or a jump of a replay.
-   *
-   * @param epoch of the frames to come
-   */
+  /** Remove all samples, for a reset or a jump of a replay; `epoch` of the frames to come. */
   restart(epoch: number) {
     this.epoch = epoch;
     this.samples.clear();
@@ -245,7 +234,6 @@ export class Store {
 
   /**
    * Show the times of a function instead of those of the live clock.
-   *
    * @param source wall time [ms] -> simulation time [s]
    */
   useTimeSource(source: ((now_ms: number) => number) | null) {
@@ -255,7 +243,6 @@ export class Store {
 
   /**
    * Get the past of vehicles from a function instead of the received samples.
-   *
    * @param source as `history`
    */
   useHistorySource(source: HistorySource | null) {
@@ -272,7 +259,6 @@ export class Store {
    *
    * Vehicles are interpolated linearly in t between the samples around t, or extrapolated from the
    * newest if it is late; objects are at pose + velocity * (t - t of their step).
-   *
    * @param now_ms the frame's time, as requestAnimationFrame gives it
    * @returns the same object each time, refilled; null before any sample
    */
@@ -297,7 +283,6 @@ export class Store {
 
   /**
    * Return a vehicle's past for plots.
-   *
    * @param index of the vehicle in the scene
    * @param seconds how far back, at most 120 s
    */
@@ -314,10 +299,17 @@ export class Store {
     return past;
   }
 
-  /**
-   * @param id of a vehicle
-   * @returns its index in the scene and in STATE, -1 when there is none
-   */
+  /** Return whether the person at this page drives a vehicle. */
+  holds(id: string): boolean {
+    return this.me.id !== '' && this.seats[id]?.holder === this.me.id;
+  }
+
+  /** Return the ids of the vehicles that the person at this page drives: one, save in between. */
+  get own(): string[] {
+    return Object.keys(this.seats).filter((id) => this.holds(id));
+  }
+
+  /** Return a vehicle's index in the scene and in STATE, -1 when there is none. */
   vehicleIndex(id: string): number {
     return this.scene === null ? -1 : this.scene.vehicles.findIndex((v) => v.id === id);
   }

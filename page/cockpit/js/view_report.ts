@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The report of this page's view to the server, which records the views of drivers. */
 
+import { DEGREES } from './units.js';
 import { fillsScreen } from './view3d/screen_place.js';
 
 import type { Connection } from './connection.js';
@@ -11,10 +12,9 @@ import type { Store } from './store.js';
 const CHECK_EVERY_MS = 100;
 // The picture rate is reported once a second [ms].
 const SEND_EVERY_MS = 1000;
-const DEGREES = 180 / Math.PI;
 
 /** A periodic report of the view; in `window.crgame.viewReport`. */
-class ViewReport {
+export class ViewReport {
   #connection;
   #store;
   #stage;
@@ -93,14 +93,4 @@ class ViewReport {
     const { view3d, world } = window.crgame;
     return view3d?.on ? view3d.stats?.frames ?? 0 : world.stats.frames;
   }
-}
-
-/**
- * Report this page's view to the server.
- *
- * @param root the stage, which holds the picture
- */
-export function createViewReport(root: HTMLElement, store: Store,
-  connection: Connection): ViewReport {
-  return new ViewReport(root, store, connection);
 }

@@ -35,10 +35,7 @@ export function breakView({ text, left_s }: BreakDocument, words: Words,
   return node;
 }
 
-/**
- * @param time_s whole seconds
- * @returns minutes:seconds
- */
+/** Return whole seconds as minutes:seconds. */
 export function clockTime(time_s: number): string {
   return `${Math.floor(time_s / 60)}:${String(time_s % 60).padStart(2, '0')}`;
 }

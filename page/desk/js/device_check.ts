@@ -18,7 +18,7 @@ import type { Profile } from '../../cockpit/js/driving/gamepad_profile.js';
 
 export type Movement = 'left' | 'right' | 'throttle' | 'brake';
 
-export const MOVEMENTS: Movement[] = ['left', 'right', 'throttle', 'brake'];
+const MOVEMENTS: Movement[] = ['left', 'right', 'throttle', 'brake'];
 // This share of its travel counts as moved.
 const MOVED = 0.6;
 // An axis this far from its first position was moved by the participant.
@@ -28,7 +28,6 @@ const KEYBOARD = 'keyboard';
 
 /**
  * Return this browser's stored calibrations for the stage, whose address has another port.
- *
  * @returns JSON of a profile, by the device's name
  */
 export function calibrations(): Record<string, string> {
@@ -75,8 +74,9 @@ export class DeviceCheck {
     this.#poll();
   }
 
-  /** Stop listening. */
+  /** Stop listening, and leave nothing in the page. */
   end() {
+    this.#calibration.remove();
     cancelAnimationFrame(this.#frame);
     window.removeEventListener('keydown', this.#key, true);
   }

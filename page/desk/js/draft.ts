@@ -20,10 +20,7 @@ export class Draft {
   #clock_s;
   #state: DraftState;
 
-  /**
-   * @param name of it, see draftName
-   * @param clock_s seconds since 1970
-   */
+  /** `name` of it, see draftName; `clock_s`: seconds since 1970. */
   constructor(name: string, clock_s: () => number) {
     this.#key = PREFIX + name;
     this.#clock_s = clock_s;
@@ -36,11 +33,7 @@ export class Draft {
     return this.#state.answers;
   }
 
-  /**
-   * Keep an answer.
-   *
-   * @param name of the question
-   */
+  /** Keep an answer; `name` of the question. */
   put(name: string, answer: Answer) {
     this.#state.answers[name] = answer;
     this.#state.after_s[name] = this.#since(this.#clock_s());
@@ -68,11 +61,7 @@ export function draftName({ study, participant, item, again }: DeskDocument) {
   return `${study}.${participant}.${item}.${again}`;
 }
 
-/**
- * Remove all drafts but one: earlier answers are on the server.
- *
- * @param name of the one that stays
- */
+/** Remove all drafts but one: earlier answers are on the server; `name` of the one that stays. */
 export function forgetOtherDrafts(name: string) {
   session.keys(PREFIX).filter((key) => key !== PREFIX + name)
     .forEach((key) => session.remove(key));

@@ -162,7 +162,6 @@ export class DriveFrame {
 
 /**
  * Return the stage's address with this page's host name, because cookies belong to one host.
- *
  * @param location of this page
  * @returns null if the link is not a page's address
  */

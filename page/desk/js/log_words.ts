@@ -30,11 +30,7 @@ export function entryWords(entry: LogEntry, words: Words): string {
   }
 }
 
-/**
- * Return the time of day.
- *
- * @param at seconds since 1970
- */
+/** Return the time of day; `at`: seconds since 1970. */
 export function timeOfDay(at: number): string {
   return new Date(1000 * at).toLocaleTimeString('en-GB');
 }

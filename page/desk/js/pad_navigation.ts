@@ -21,10 +21,7 @@ export class PadNavigation {
   #pressed = new Map<number, boolean[]>();
   #frame = 0;
 
-  /**
-   * @param sheet the element with the questions
-   * @param drive the gate before a drive
-   */
+  /** `sheet`: the element with the questions; `drive`: the gate before a drive. */
   constructor(sheet: HTMLElement, drive: HTMLElement) {
     this.#sheet = sheet;
     this.#drive = drive;

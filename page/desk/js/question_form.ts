@@ -11,11 +11,7 @@ import type {
 import type { Draft } from './draft.js';
 import type { Words } from './words.js';
 
-/**
- * Build the form.
- *
- * @param finish called with the answers once all are valid
- */
+/** Build the form; `finish` called with the answers once all are valid. */
 export function questionForm(shown: QuestionsDocument, words: Words, draft: Draft,
   finish: (told: Told) => void): HTMLElement {
   const summary = element('p', { class: 'problem', role: 'alert' });

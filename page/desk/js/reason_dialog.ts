@@ -8,7 +8,6 @@ import type { Words } from './words.js';
 
 /**
  * Show the dialog and return the reason.
- *
  * @param yes text of the button that confirms
  * @param reasoned whether a reason is asked for
  * @returns the reason, empty where none is asked for; null for no

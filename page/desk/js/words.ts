@@ -17,7 +17,6 @@ export class Words {
 
   /**
    * Return a number as text.
-   *
    * @param digits behind its decimal mark; without, as many of six digits as it needs.
    */
   number(value: number, digits?: number): string {
@@ -26,11 +25,7 @@ export class Words {
       : { minimumFractionDigits: digits, maximumFractionDigits: digits } });
   }
 
-  /**
-   * Return a text.
-   *
-   * @param values for the placeholders in braces
-   */
+  /** Return a text; `values` for the placeholders in braces. */
   of(key: string, values: Record<string, string | number> = {}): string {
     return (this.#table[key] ?? key).replaceAll(
       /\{(\w+)\}/g, (whole, name) => (Object.hasOwn(values, name) ? `${values[name]}` : whole));

@@ -8,7 +8,7 @@ import { icon } from '../panels/icons.js';
 
 import type { Store } from '../store.js';
 
-export const REPLAYED_S = 10;
+const REPLAYED_S = 10;
 const SPEEDS = [1, 0.5, 0.25, 0.1];
 const DRAWN_EVERY_MS = 100;
 
@@ -27,10 +27,7 @@ export class InstantReplay {
   #play;
   #slider;
 
-  /**
-   * @param root of the bar
-   * @param store its samples are shown
-   */
+  /** `root` of the bar; `store`: its samples are shown. */
   constructor(root: HTMLElement, store: Store) {
     this.#root = root;
     this.#store = store;
@@ -142,13 +139,4 @@ export class InstantReplay {
     setAttribute(this.#play, 'aria-label', this.#play.title);
     this.#show();
   }
-}
-
-/**
- * Create the bar, closed.
- *
- * @param root #last-seconds
- */
-export function createInstantReplay(root: HTMLElement, store: Store): InstantReplay {
-  return new InstantReplay(root, store);
 }

@@ -3,8 +3,8 @@
 /** The R key: holding it restarts the run, tapping it selects the reverse gear. */
 
 import { element, setAttribute, setText } from '../dom.js';
-import { isTyping } from '../driving/focus.js';
-import { reasonAgainstOrder } from '../rights.js';
+import { isCommand } from '../driving/focus.js';
+import { reasonAgainstOrder, tellRefusal } from '../rights.js';
 
 import type { Connection } from '../connection.js';
 import type { Store } from '../store.js';
@@ -16,12 +16,7 @@ const SHOWN_AFTER_MS = 250;
 const KEY = 'KeyR';
 const HINT = 'Hold R to begin anew';
 
-/**
- * Listen to the key.
- *
- * @param root gets the hint
- * @returns held: whether the key is down and counts
- */
+/** Listen to the key, which counts while `held`; `root` gets the hint. */
 export function createRestart(root: HTMLElement, store: Store,
   connection: Connection): { held: boolean } {
   const state = { held: false };
@@ -34,16 +29,12 @@ export function createRestart(root: HTMLElement, store: Store,
     state.held = false;
     setAttribute(hint, 'hidden', true);
   };
-  const restart = async () => {
+  const restart = () => {
     end();
-    const { ok, text } = await connection.request({ type: 'control', action: 'reset' });
-    if (!ok) {
-      store.receive({ type: 'notice', level: 'warn', text });
-    }
+    tellRefusal(store, connection.request({ type: 'control', action: 'reset' }));
   };
   window.addEventListener('keydown', (event) => {
-    if (event.code !== KEY || event.repeat || event.ctrlKey || event.metaKey || event.altKey
-        || isTyping(event.target) || document.querySelector('dialog[open]')
+    if (event.code !== KEY || event.repeat || !isCommand(event)
         || store.mode !== 'live' || !store.connected || store.status === null) {
       return;
     }

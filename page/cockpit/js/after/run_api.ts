@@ -3,7 +3,6 @@
 /** Requests to the server about past runs; every refusal becomes an Error with one line. */
 
 import { ask, post } from '../panels/scenario_api.js';
-import { oneLine } from '../panels/format.js';
 
 import type { PastRun, Score } from '../api_messages.js';
 import type { Reply } from '../messages.js';
@@ -18,13 +17,9 @@ export function fetchScore(id: string): Promise<Score> {
   return ask(`/api/runs/score?id=${encodeURIComponent(id)}`);
 }
 
-/**
- * @param id of a run
- * @returns what was done
- */
-export async function deleteRun(id: string): Promise<string> {
-  const reply = await post<Reply>('/api/runs/delete', { id });
-  return oneLine(reply.text);
+/** @param id of a run */
+export function deleteRun(id: string): Promise<Reply> {
+  return post('/api/runs/delete', { id });
 }
 
 /** @param id of a run */
@@ -33,10 +28,7 @@ export const pictureAddress = (id: string) => `/api/runs/picture?id=${encodeURIC
 /** @param id of a run */
 export const zipAddress = (id: string) => `/api/runs/zip?id=${encodeURIComponent(id)}`;
 
-/**
- * @param id of a run
- * @param name of one of its files
- */
+/** `id` of a run; `name` of one of its files. */
 export const fileAddress = (id: string, name: string) => (
   `/api/runs/file?id=${encodeURIComponent(id)}&file=${encodeURIComponent(name)}`);
 

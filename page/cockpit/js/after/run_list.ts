@@ -16,7 +16,7 @@ const MOST_COMPARED = 6;
 const MEGA = 1e6;
 
 /** The list; one per page. */
-class RunList {
+export class RunList {
   #store;
   #root;
   #list = element('ul', { class: 'runs' });
@@ -35,8 +35,7 @@ class RunList {
     root.append(element('div', { class: 'stack' }, this.#compare, this.#error, this.#hint,
       this.#list));
     new MutationObserver(() => this.#seen()).observe(root, { attributeFilter: ['hidden'] });
-    store.on('files', () => this.#seen());
-    store.on('hello', () => this.#seen());
+    store.on(['files', 'hello'], () => this.#seen());
     this.#seen();
   }
 
@@ -51,7 +50,6 @@ class RunList {
 
   /**
    * Fetch the list of runs from the server.
-   *
    * @param refusal of an order, to be told meanwhile and with the new list
    */
   async refresh(refusal = '') {
@@ -188,13 +186,4 @@ function fileMenu({ id, files }: PastRun) {
 
 function button(action: string, text: string, act: () => void) {
   return element('button', { type: 'button', 'data-action': action, text, on: { click: act } });
-}
-
-/**
- * Create the panel, which fetches the list when it is shown.
- *
- * @param root #panel-runs
- */
-export function createRunList(root: HTMLElement, store: Store): RunList {
-  return new RunList(root, store);
 }

@@ -4,20 +4,16 @@
 
 import { element } from '../dom.js';
 import { fixed } from '../panels/format.js';
+import { KMH } from '../units.js';
 
 import type { Score, VehicleScore } from '../api_messages.js';
 
-const KMH = 3.6;
 
 /** The state of a score: being computed, the score, or why there is none. */
 export type Scored = { state: 'waiting' } | { state: 'told'; score: Score }
   | { state: 'none'; why: string };
 
-/**
- * Build the table of scores.
- *
- * @param mine the vehicle that this page drives, shown first
- */
+/** Build the table of scores; `mine`: the vehicle that this page drives, shown first. */
 export function scoreBlock(scored: Scored, mine: string | null): HTMLElement {
   const root = element('section', { class: 'score', 'aria-label': 'Score',
     'data-state': scored.state });

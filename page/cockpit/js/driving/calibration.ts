@@ -1,16 +1,15 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The dialog that measures which axes of a device steer, and their range. */
+/** The dialog that measures which axes of a device steer, and how far, and tries the mapping. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { CalibrationRun, STEPS } from './calibration_run.js';
-import { CalibrationTest } from './calibration_test_view.js';
 import { connectedPads } from './gamepad.js';
-import { loadProfile, sampleOf } from './gamepad_profile.js';
-import { RawBars } from './raw_bars.js';
+import { gearAfter, loadProfile, pedalValue, sampleOf, steeringValue } from './gamepad_profile.js';
+import { pedalBar, steeringBar, steeringWheel } from './gauges.js';
 
-import type { CalibrationStep } from './calibration_run.js';
-import type { Profile, Sample } from './gamepad_profile.js';
+import type { CalibrationStep, Kind, Place } from './calibration_run.js';
+import type { Control, Profile, Sample } from './gamepad_profile.js';
 
 const TEXTS: Record<CalibrationStep, [title: string, instruction: string]> = {
   centre: ['Rest', 'Hold the wheel or stick straight, take your feet off the pedals, then press '
@@ -74,6 +73,12 @@ export class CalibrationDialog {
     this.#poll(performance.now());
   }
 
+  /** Close it, and take it out of the page. */
+  remove() {
+    this.#dialog.close();
+    this.#dialog.remove();
+  }
+
   #poll(now_ms: number) {
     const pad = connectedPads().find(({ index }) => index === this.#pad?.index);
     if (pad === undefined) {
@@ -129,4 +134,139 @@ export class CalibrationDialog {
     return element('button', { type: 'button', class: `drive-button ${kind}`, text,
       on: { click: act } });
   }
+}
+
+interface Row { node: HTMLElement; fill: HTMLElement; value: HTMLElement | null }
+
+/** Bars for each axis (-1 to 1) and button (0 to 1). */
+class RawBars {
+  #rows: Record<Kind, Row[]> = { axis: [], button: [] };
+  node;
+
+  /** @param sample of the device, for its number of axes and buttons */
+  constructor(sample: Sample) {
+    const axes = sample.axes.map((_, i) => this.#row('axis', `Axis ${i}`));
+    const buttons = sample.buttons.map((_, i) => this.#row('button', `${i}`));
+    this.node = element('div', { class: 'raw-bars' },
+      element('div', { class: 'raw-axes' }, ...axes),
+      element('div', { class: 'raw-buttons', 'aria-label': 'Buttons' },
+        element('span', { class: 'bar-label', text: 'Buttons' }), ...buttons));
+  }
+
+  /** Show a sample; `found`: the moved control, which is marked. */
+  show(sample: Sample, found: Place | null) {
+    this.#showAll('axis', sample.axes, found);
+    this.#showAll('button', sample.buttons, found);
+  }
+
+  #showAll(kind: Kind, values: number[], found: Place | null) {
+    this.#rows[kind].forEach((row, index) => {
+      const value = values[index] ?? 0;
+      row.fill.style.transform = kind === 'axis' ? `scaleX(${value.toFixed(3)})`
+        : `scaleY(${value.toFixed(3)})`;
+      if (row.value) {
+        setText(row.value, value.toFixed(2));
+      }
+      setAttribute(row.node, 'data-found', found?.kind === kind && found.index === index);
+    });
+  }
+
+  #row(kind: Kind, text: string) {
+    const fill = element('div', { class: 'bar-fill' });
+    const value = kind === 'axis' ? element('span', { class: 'bar-value' }) : null;
+    const node = element('div', { class: `raw-${kind}` },
+      element('span', { class: 'bar-label', text }),
+      element('div', { class: 'bar' }, fill), value);
+    this.#rows[kind].push({ node, fill, value });
+    return node;
+  }
+}
+
+type ControlName = 'steering' | 'throttle' | 'brake';
+
+const NAMES: Record<ControlName, string> = {
+  steering: 'Steering', throttle: 'Throttle', brake: 'Brake',
+};
+const CONTROLS = Object.keys(NAMES) as ControlName[];
+const MOST_DEADZONE = 0.3;
+
+/** A view of a profile at work; `node` goes into the dialog. */
+class CalibrationTest {
+  #profile: Profile | null = null;
+  #reverse = false;
+  #pressed: boolean[] = [];
+  #wheel = steeringWheel();
+  #bars = {
+    steering: steeringBar(), throttle: pedalBar('throttle', 'Throttle'),
+    brake: pedalBar('brake', 'Brake'),
+  };
+  #gear = element('span', { class: 'hud-gear', text: 'D' });
+  #tuning = element('div', { class: 'tuning' });
+  node;
+
+  constructor() {
+    const { steering, throttle, brake } = this.#bars;
+    this.node = element('div', { class: 'calibration-test', hidden: true },
+      element('div', { class: 'calibration-seen' }, brake.node, throttle.node, this.#wheel.node,
+        steering.node, this.#gear),
+      this.#tuning);
+  }
+
+  /** Show the effect of a sample; `profile`: null hides this view. */
+  show(profile: Profile | null, sample?: Sample) {
+    setAttribute(this.node, 'hidden', profile === null);
+    if (profile !== this.#profile) {
+      this.#profile = profile;
+      this.#reverse = false;
+      this.#pressed = [];
+      this.#tuning.replaceChildren(...profile === null ? []
+        : CONTROLS.map((name) => this.#row(name, profile[name])));
+    }
+    if (profile !== null && sample !== undefined) {
+      this.#move(profile, sample);
+    }
+  }
+
+  #move(profile: Profile, sample: Sample) {
+    const steering = steeringValue(sample, profile.steering);
+    this.#wheel.turn(steering);
+    this.#bars.steering.show(steering, false, false);
+    for (const name of ['throttle', 'brake'] as const) {
+      const value = pedalValue(sample, profile[name]);
+      this.#bars[name].show(value, false);
+      this.#bars[name].write(value);
+    }
+    sample.buttons.forEach((value, i) => {
+      if ((value > 0.5) !== (this.#pressed[i] ?? false)) {
+        this.#pressed[i] = value > 0.5;
+        this.#reverse = gearAfter(profile.reverse, this.#reverse, i, value > 0.5);
+      }
+    });
+    setText(this.#gear, this.#reverse ? 'R' : 'D');
+    setAttribute(this.#gear, 'data-gear', this.#reverse ? 'R' : 'D');
+  }
+
+  #row(name: ControlName, control: Control) {
+    const shown = element('output', { text: percent(control.deadzone) });
+    const range = element('input', { type: 'range', min: 0, max: MOST_DEADZONE, step: 0.01,
+      value: control.deadzone, 'aria-label': `Dead zone of ${NAMES[name]}` });
+    range.addEventListener('input', () => {
+      control.deadzone = Number(range.value);
+      setText(shown, percent(control.deadzone));
+    });
+    const turned = element('input', { type: 'checkbox' });
+    turned.checked = control.invert;
+    turned.addEventListener('change', () => {
+      control.invert = turned.checked;
+    });
+    const where = `${control.kind === 'axis' ? 'Axis' : 'Button'} ${control.index}`;
+    return element('div', { class: 'tuning-row' },
+      element('strong', { text: NAMES[name] }), element('span', { text: where }),
+      element('label', {}, 'Dead zone ', range, shown),
+      element('label', {}, turned, ' Inverted'));
+  }
+}
+
+function percent(share: number) {
+  return `${Math.round(100 * share)} %`;
 }

@@ -63,7 +63,6 @@ export class CalibrationRun {
 
   /**
    * Add a sample; a step ends by itself when the moved control is back at rest.
-   *
    * @returns whether the step ended
    */
   feed(sample: Sample, now_ms: number): boolean {
@@ -86,7 +85,6 @@ export class CalibrationRun {
 
   /**
    * End this step with what was measured.
-   *
    * @returns false when nothing that fits has been moved yet
    */
   next(): boolean {

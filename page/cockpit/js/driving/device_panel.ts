@@ -50,7 +50,6 @@ export class DevicePanel {
 
 /**
  * Shorten the name of a gamepad in browsers.
- *
  * @param id such as 'Wheel (Vendor: 046d Product: c24f)'
  */
 export function shortName(id: string): string {

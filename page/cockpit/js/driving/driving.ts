@@ -4,7 +4,7 @@
 
 import { part } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
-import { createSeats } from '../seats.js';
+import { Seats } from '../seats.js';
 import { CalibrationDialog } from './calibration.js';
 import { DevicePanel, shortName } from './device_panel.js';
 import { Focus } from './focus.js';
@@ -155,8 +155,7 @@ export class Driving {
   }
 
   #updateSeat() {
-    const { seats, me } = this.#store;
-    const mine = Object.keys(seats).filter((id) => seats[id].holder === me.id && me.id !== '');
+    const mine = this.#store.own;
     if (this.#store.mode !== 'live' || !this.#store.connected || mine.length === 0) {
       this.#leaveSeat();
     } else if (this.seat === null || !mine.includes(this.seat)) {
@@ -178,7 +177,7 @@ export class Driving {
 
   #leaveSeat() {
     if (this.seat !== null) {
-      if (this.#store.seats[this.seat]?.holder === this.#store.me.id) {
+      if (this.#store.holds(this.seat)) {
         this.#connection.send({ type: 'input', seat: this.seat, away: true });
       }
       this.#sender.seat = null;
@@ -249,6 +248,6 @@ export class Driving {
 /** Put the instruments, the seats and the input devices into the page. */
 export function createDriving(root: HTMLElement, store: Store, connection: Connection): Driving {
   const driving = new Driving(root, store, connection);
-  createSeats(part(root, 'panel-drive'), store, connection, driving);
+  new Seats(part(root, 'panel-drive'), store, connection, driving);
   return driving;
 }

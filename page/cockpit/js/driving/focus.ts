@@ -12,6 +12,12 @@ export function isTyping(target: EventTarget | null): boolean {
   return target instanceof Element && target.closest(EDITABLE) !== null;
 }
 
+/** Return whether a key may be a command: not with a modifier, in a text or behind a dialog. */
+export function isCommand(event: KeyboardEvent): boolean {
+  return !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping(event.target)
+    && document.querySelector('dialog[open]') === null;
+}
+
 /** A watch on focus, visibility, dialogs and the connection. */
 export class Focus {
   #store;
@@ -24,10 +30,7 @@ export class Focus {
    */
   reason;
 
-  /**
-   * @param store its `connected` counts
-   * @param changed called at once at each change of `reason`
-   */
+  /** `store`: its `connected` counts; `changed` called at once at each change of `reason`. */
   constructor(store: Store, changed: (reason: string | null) => void) {
     this.#store = store;
     this.#changed = changed;

@@ -117,11 +117,7 @@ export class Gamepads {
     return this.#active?.profile.reverse.held.some((i) => this.#pressed[i]) ?? false;
   }
 
-  /**
-   * Choose the device that drives.
-   *
-   * @param index of the device; null leaves only the keyboard
-   */
+  /** Choose the device that drives; `index` of the device; null leaves only the keyboard. */
   choose(index: number | null) {
     const device = index === null ? null : this.#devices.get(index) ?? null;
     for (const other of this.#devices.values()) {
@@ -133,7 +129,6 @@ export class Gamepads {
 
   /**
    * Save a mapping for a device, or delete it and use the default again.
-   *
    * @param index of the device
    */
   setProfile(index: number, profile: Profile | null) {

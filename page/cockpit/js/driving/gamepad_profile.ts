@@ -42,7 +42,6 @@ export function sampleOf(pad: Gamepad): Sample {
 
 /**
  * Return the default mapping of a device that is not calibrated.
- *
  * @param pad in its first state: Logitech pedals rest at +1.
  */
 export function defaultProfile(pad: Gamepad): Profile {
@@ -129,12 +128,7 @@ export function loadProfile(pad: Gamepad): { profile: Profile; calibrated: boole
   return { profile: defaultProfile(pad), calibrated: false };
 }
 
-/**
- * Save a calibrated mapping in this browser.
- *
- * @param id of the gamepad.
- * @param profile null forgets it.
- */
+/** Save a calibrated mapping in this browser; `id` of the gamepad; `profile`: null forgets it. */
 export function saveProfile(id: string, profile: Profile | null) {
   if (profile === null) {
     local.remove(PREFIX + id);
@@ -145,7 +139,6 @@ export function saveProfile(id: string, profile: Profile | null) {
 
 /**
  * Save the mappings of another page of this machine; invalid ones are left out.
- *
  * @param profiles JSON of each, by the gamepad's id
  */
 export function keepProfiles(profiles: Record<string, unknown>) {
@@ -179,31 +172,19 @@ function isLights(lights: Partial<LightButtons> | undefined) {
   return LIGHT_BUTTONS.every((name) => Array.isArray(lights?.[name]));
 }
 
-/**
- * Read one raw value of a sample.
- *
- * @returns NaN if the device has no such control.
- */
+/** Read one raw value of a sample; return NaN if the device has no such control. */
 export function rawValue(sample: Sample, control: Pick<Control, 'kind' | 'index'>): number {
   const values = control.kind === 'axis' ? sample.axes : sample.buttons;
   return values[control.index] ?? NaN;
 }
 
-/**
- * Return a pedal's share of its travel.
- *
- * @returns 0 (released) to 1.
- */
+/** Return a pedal's share of its travel: 0 (released) to 1. */
 export function pedalValue(sample: Sample, control: Control): number {
   const share = (rawValue(sample, control) - control.min) / (control.max - control.min);
   return beyond(control.invert ? 1 - share : share, control.deadzone);
 }
 
-/**
- * Return the steering of a sample.
- *
- * @returns -1 to 1, positive to the left.
- */
+/** Return the steering of a sample: -1 to 1, positive to the left. */
 export function steeringValue(sample: Sample, control: Control): number {
   const centre = control.centre ?? NaN;
   const offset = rawValue(sample, control) - centre;
@@ -220,7 +201,6 @@ function beyond(share: number, deadzone: number) {
 
 /**
  * Return the gear after a button changed.
- *
  * @param reverse the gear before.
  * @param index of the button.
  * @param pressed whether it is pressed now.

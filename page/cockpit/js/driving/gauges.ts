@@ -1,77 +1,72 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Bars that show a command, solid, and the raw key behind it, outlined. */
+/** Bars that show a command, solid, and the raw key behind it, outlined; a steering wheel. */
 
-import { element, setAttribute, setText } from '../dom.js';
+import { element, setAttribute, setText, svg } from '../dom.js';
 
-const scaled = (share: number) => (Number.isFinite(share) ? share : 0).toFixed(3);
+// Half a turn would look the same on both sides; with 150 degrees at full lock, they differ.
+const FULL_LOCK_DEG = 150;
 
-/** An upright bar of one pedal. */
-export class PedalBar {
-  #fill;
-  #key;
-  #value;
-  node;
-
-  /**
-   * @param kind 'throttle' or 'brake'
-   * @param label under the bar
-   */
-  constructor(kind: string, label: string) {
-    this.#fill = element('div', { class: 'bar-fill' });
-    this.#key = element('div', { class: 'bar-key' });
-    this.#value = element('span', { class: 'bar-value', text: '–' });
-    this.node = element('div', { class: `pedal pedal-${kind}` },
-      element('div', { class: 'bar' }, this.#fill, this.#key),
-      this.#value, element('span', { class: 'bar-label', text: label }));
-  }
-
-  /**
-   * Show the bar and the outline of its key.
-   *
-   * @param command 0 to 1, NaN if no command is in force
-   * @param key whether its key is held
-   */
-  show(command: number, key: boolean) {
-    const transform = `scaleY(${scaled(command)})`;
-    if (this.#fill.style.transform !== transform) {
-      this.#fill.style.transform = transform;
-    }
-    setAttribute(this.#key, 'data-on', key);
-  }
-
-  /** @param command written beside the bar in per cent */
-  write(command: number) {
-    setText(this.#value, Number.isFinite(command) ? `${Math.round(100 * command)} %` : '–');
+/** Stretch the filled part of a bar; a share of NaN is none. */
+function stretch(fill: HTMLElement, axis: 'X' | 'Y', share: number) {
+  const transform = `scale${axis}(${(Number.isFinite(share) ? share : 0).toFixed(3)})`;
+  if (fill.style.transform !== transform) {
+    fill.style.transform = transform;
   }
 }
 
-/** A horizontal bar of the steering, with its zero in the middle. */
-export class SteeringBar {
-  #fill = element('div', { class: 'bar-fill' });
-  #left = element('div', { class: 'bar-key bar-left' });
-  #right = element('div', { class: 'bar-key bar-right' });
-  node;
+/** Make an upright bar of a pedal, `kind` 'throttle' or 'brake', with a label under it. */
+export function pedalBar(kind: string, label: string) {
+  const fill = element('div', { class: 'bar-fill' });
+  const key = element('div', { class: 'bar-key' });
+  const value = element('span', { class: 'bar-value', text: '–' });
+  return {
+    node: element('div', { class: `pedal pedal-${kind}` },
+      element('div', { class: 'bar' }, fill, key), value,
+      element('span', { class: 'bar-label', text: label })),
+    /** Show a command, 0 to 1 or NaN if none is in force, and whether its key is held. */
+    show(command: number, held: boolean) {
+      stretch(fill, 'Y', command);
+      setAttribute(key, 'data-on', held);
+    },
+    /** Write a command beside the bar in per cent. */
+    write(command: number) {
+      setText(value, Number.isFinite(command) ? `${Math.round(100 * command)} %` : '–');
+    },
+  };
+}
 
-  constructor() {
-    this.node = element('div', { class: 'bar steering-bar' },
-      this.#fill, this.#left, this.#right, element('div', { class: 'bar-zero' }));
-  }
+/** Make a horizontal bar of the steering, with its zero in the middle. */
+export function steeringBar() {
+  const fill = element('div', { class: 'bar-fill' });
+  const keys = ['left', 'right'].map((side) => element('div', { class: `bar-key bar-${side}` }));
+  return {
+    node: element('div', { class: 'bar steering-bar' },
+      fill, ...keys, element('div', { class: 'bar-zero' })),
+    /** Show a command, -1 (right) to 1 (left) or NaN for none, and whether its keys are held. */
+    show(command: number, left: boolean, right: boolean) {
+      // The fill grows from the middle to the right; a left command mirrors it.
+      stretch(fill, 'X', -command);
+      setAttribute(keys[0], 'data-on', left);
+      setAttribute(keys[1], 'data-on', right);
+    },
+  };
+}
 
-  /**
-   * Show the bar and the outlines of its keys.
-   *
-   * @param command -1 (right) to 1 (left), NaN if no command is in force
-   * @param left whether a left key is held
-   * @param right whether a right key is held
-   */
-  show(command: number, left: boolean, right: boolean) {
-    // The fill grows from the middle to the right; a left command mirrors it.
-    const transform = `scaleX(${scaled(-command)})`;
-    if (this.#fill.style.transform !== transform) {
-      this.#fill.style.transform = transform;
-    }
-    setAttribute(this.#left, 'data-on', left);
-    setAttribute(this.#right, 'data-on', right);
-  }
+/** Draw a steering wheel. */
+export function steeringWheel() {
+  const turning = svg('g', { class: 'wheel-turning' },
+    svg('circle', { class: 'wheel-rim', r: 42 }),
+    svg('path', { class: 'wheel-spokes', d: 'M-40 4 L-12 2 M40 4 L12 2 M0 12 L0 40' }),
+    svg('circle', { class: 'wheel-hub', r: 13 }),
+    svg('path', { class: 'wheel-top', d: 'M-8 -41.2 A42 42 0 0 1 8 -41.2' }));
+  return {
+    node: svg('svg', { class: 'wheel', viewBox: '-50 -50 100 100', role: 'img',
+      'aria-label': 'Steering wheel' }, turning),
+    /** Turn the wheel with a command, -1 (right) to 1 (left). */
+    turn(steering: number) {
+      const angle = Number.isFinite(steering) ? -steering * FULL_LOCK_DEG : 0;
+      setAttribute(turning, 'transform', `rotate(${angle.toFixed(1)})`);
+    },
+  };
 }

@@ -1,14 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The instruments over the world, of the driven or the watched vehicle. */
+/** The instruments and keys over the world, of the driven or the watched vehicle. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
-import { PedalBar, SteeringBar } from './gauges.js';
-import { Keycaps } from './keycaps.js';
-import { LightSigns } from './light_signs.js';
+import { LIGHT, shining } from '../lights.js';
+import { DEGREES, KMH } from '../units.js';
+import { pedalBar, steeringBar, steeringWheel } from './gauges.js';
 import { SpeedLimits } from './speed_limit.js';
-import { SteeringWheel } from './steering_wheel.js';
 
 import type { Scene, SceneVehicle } from '../messages.js';
 import type { Store } from '../store.js';
@@ -18,8 +17,6 @@ import type { Keyboard } from './keyboard.js';
 const NUMBERS_EVERY_MS = 100;
 const LIMIT_EVERY_MS = 300;
 const STANDSTILL = 0.05;
-const KMH = 3.6;
-const DEGREES = 180 / Math.PI;
 // Tolerance, so that rounding does not make a limit look exceeded [m/s].
 const LIMIT_TOLERANCE = 0.3;
 
@@ -195,9 +192,9 @@ function buildParts(keyboard: Keyboard) {
     angle: span('angle', 'Angle of the front wheels, positive to the left'),
     command: span('command', 'Steering command, positive to the left'),
     limit: element('span', { class: 'hud-limit', role: 'img', title: 'Speed limit' }),
-    throttle: new PedalBar('throttle', 'Throttle'), brake: new PedalBar('brake', 'Brake'),
-    steering: new SteeringBar(), wheel: new SteeringWheel(), keycaps: new Keycaps(keyboard),
-    lights: new LightSigns(),
+    throttle: pedalBar('throttle', 'Throttle'), brake: pedalBar('brake', 'Brake'),
+    steering: steeringBar(), wheel: steeringWheel(), keycaps: new Keycaps(keyboard),
+    lights: lightSigns(),
     banner: element('div', { class: 'hud-banner', role: 'status', 'aria-live': 'polite' }),
   };
   const board = element('div', { class: 'hud-board' },
@@ -212,7 +209,7 @@ function buildParts(keyboard: Keyboard) {
 }
 
 function speedBlock({ kmh, ms, acceleration, lights }: Record<'kmh' | 'ms' | 'acceleration',
-  HTMLElement> & { lights: LightSigns }) {
+  HTMLElement> & { lights: ReturnType<typeof lightSigns> }) {
   return element('div', { class: 'hud-speed' }, lights.node,
     element('div', { class: 'hud-main' }, kmh,
       element('span', { class: 'hud-unit', text: 'km/h' })),
@@ -220,7 +217,7 @@ function speedBlock({ kmh, ms, acceleration, lights }: Record<'kmh' | 'ms' | 'ac
 }
 
 function turnBlock({ angle, command, steering }: { angle: HTMLElement; command: HTMLElement;
-  steering: SteeringBar }) {
+  steering: ReturnType<typeof steeringBar> }) {
   return element('div', { class: 'hud-turn' }, element('div', { class: 'hud-angles' },
     label('Wheels', angle), label('Steering', command)), steering.node);
 }
@@ -228,4 +225,89 @@ function turnBlock({ angle, command, steering }: { angle: HTMLElement; command: 
 function label(text: string, value: HTMLElement) {
   return element('div', { class: 'hud-labelled' },
     element('span', { class: 'bar-label', text }), value);
+}
+
+const SIGNS: [name: 'left' | 'horn' | 'right', sign: string, title: string][] = [
+  ['left', '◄', 'Left indicator'], ['horn', '♪', 'Horn'], ['right', '►', 'Right indicator'],
+];
+
+/** Make the signs over the speed, lit like the vehicle's lights. */
+function lightSigns() {
+  const signs = SIGNS.map(([name, text, title]) => ({
+    name, title, node: element('span', { class: `sign sign-${name}`, role: 'img', title, text }),
+  }));
+  return {
+    node: element('div', { class: 'hud-lights' }, ...signs.map(({ node }) => node)),
+    /** Update the signs; `lights` as the vehicle's state has them; `t`: simulation time [s]. */
+    show(lights: number, t: number) {
+      const shines = shining(lights, t);
+      for (const { name, title, node } of signs) {
+        // Screen readers are told once, not at each blink.
+        setAttribute(node, 'aria-label', `${title} ${(lights & LIGHT[name]) > 0 ? 'on' : 'off'}`);
+        setAttribute(node, 'data-on', shines[name]);
+      }
+    },
+  };
+}
+
+// The place of a key, its label, the other key with the same function, and a sign beside it.
+const CAPS: [code: string, text: string, twin: string | null, title: string, sign?: string][] = [
+  ['KeyW', 'W', 'ArrowUp', 'Throttle'], ['KeyR', 'R', null, 'Reverse gear'],
+  ['KeyA', 'A', 'ArrowLeft', 'Left'], ['KeyS', 'S', 'ArrowDown', 'Brake'],
+  ['KeyD', 'D', 'ArrowRight', 'Right'], ['Space', 'Space', null, 'Brake'],
+  ['Comma', ',', null, 'Left indicator', '◄'], ['Period', '.', null, 'Right indicator', '►'],
+  ['KeyJ', 'J', null, 'Hazard lights', '◄►'], ['KeyG', 'G', null, 'Horn', '♪'],
+];
+
+/** The drawn keys; `node` goes into the page. */
+class Keycaps {
+  #caps = new Map<string, HTMLElement>();
+  node;
+
+  /** @param keyboard receives touch presses */
+  constructor(keyboard: Pick<Keyboard, 'press' | 'lift'>) {
+    for (const [code, text, , title, sign] of CAPS) {
+      const lift = () => keyboard.lift(code);
+      this.#caps.set(code, element('kbd', { class: `cap cap-${code}`, title,
+        text: sign === undefined ? text : `${text} ${sign}`, on: {
+        pointerdown: (event) => {
+          event.preventDefault();
+          // A finger that slides off the key still holds it.
+          (event.currentTarget as HTMLElement).setPointerCapture(event.pointerId);
+          keyboard.press(code);
+        },
+        pointerup: lift, pointercancel: lift, lostpointercapture: lift,
+        contextmenu: (event) => event.preventDefault(),
+      } }));
+    }
+    this.node = element('div', { class: 'keycaps', role: 'group',
+      'aria-label': 'Keys: W throttle, A left, S brake, D right, space brake, R reverse, '
+        + 'comma and period indicators, J hazard lights, G horn, Backspace back on the lane '
+        + 'after a contact' },
+    ...this.#caps.values());
+    this.#readLayout();
+  }
+
+  /** Light the held keys; `reverse`: whether the reverse gear is requested. */
+  show(keyboard: Keyboard, reverse: boolean) {
+    for (const [code, , twin] of CAPS) {
+      const on = code === 'KeyR' ? reverse
+        : keyboard.isHeld(code) || (twin !== null && keyboard.isHeld(twin));
+      setAttribute(this.#cap(code), 'data-on', on);
+    }
+  }
+
+  /** @param code of CAPS */
+  #cap(code: string): HTMLElement {
+    return this.#caps.get(code) as HTMLElement;
+  }
+
+  /** Write the labels of the user's keyboard layout, if the browser knows it. */
+  async #readLayout() {
+    const layout = await navigator.keyboard?.getLayoutMap?.().catch(() => undefined);
+    for (const [code, text, , , sign] of CAPS) {
+      const key = layout?.get(code)?.toUpperCase() ?? text;
+      setText(this.#cap(code), sign === undefined ? key : `${key} ${sign}`);
+    }
+  }
 }

@@ -16,7 +16,6 @@ const PATHS: Record<RunAction, string> = {
 
 /**
  * Draw an icon in the colour of the text around it.
- *
  * @param name one of start, pause, step, reset and stop
  */
 export function icon(name: RunAction): SVGElement {

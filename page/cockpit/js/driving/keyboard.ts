@@ -4,7 +4,7 @@
 
 import { HELD_MS } from '../after/restart_key.js';
 import { LIGHT_BUTTONS } from '../lights.js';
-import { isTyping } from './focus.js';
+import { isCommand, isTyping } from './focus.js';
 
 export type KeyAction = 'throttle' | 'brake' | 'left' | 'right' | 'reverse' | 'put_back'
   | typeof LIGHT_BUTTONS[number];
@@ -66,30 +66,19 @@ export class Keyboard {
     return this.keys.includes(1);
   }
 
-  /**
-   * @param code place of a key, such as 'KeyW'
-   * @returns whether it is held
-   */
+  /** Return whether a key is held; `code`: its place, such as 'KeyW'. */
   isHeld(code: string): boolean {
     return this.#held.has(code);
   }
 
-  /**
-   * Press a key by touch.
-   *
-   * @param code place of a key
-   */
+  /** Press a key by touch; `code`: place of a key. */
   press(code: string) {
     if (this.#enabled()) {
       this.#press(code, performance.now());
     }
   }
 
-  /**
-   * Release a key that `press` has pressed.
-   *
-   * @param code place of a key
-   */
+  /** Release a key that `press` has pressed; `code`: place of a key. */
   lift(code: string) {
     this.#leave(code, performance.now());
   }
@@ -115,8 +104,7 @@ export class Keyboard {
       return;
     }
     const action = ACTIONS[event.code];
-    if (!action || event.ctrlKey || event.metaKey || event.altKey || event.isComposing
-        || isTyping(event.target) || !this.#enabled()) {
+    if (!action || event.isComposing || !isCommand(event) || !this.#enabled()) {
       return;
     }
     event.preventDefault();

@@ -11,51 +11,38 @@ import type { Store } from '../store.js';
 const KEY = 'crgame.name';
 const LONGEST = 40;
 
-/** The field; `node` goes into the page. */
-export class NameField {
-  #store;
-  #connection;
-  #input = element('input', { type: 'text', id: 'my-name', maxlength: LONGEST,
+/** Make the field. */
+export function nameField(store: Store, connection: Connection): HTMLElement {
+  const input = element('input', { type: 'text', id: 'my-name', maxlength: LONGEST,
     autocomplete: 'nickname', placeholder: 'Your name' });
-  node;
-
-  constructor(store: Store, connection: Connection) {
-    this.#store = store;
-    this.#connection = connection;
-    this.node = element('form', { class: 'name-field' },
-      element('label', { for: 'my-name', text: 'You are' }), this.#input);
-    this.node.addEventListener('submit', (event) => {
-      event.preventDefault();
-      // Leaving the field returns the keys to the vehicle.
-      this.#input.blur();
-    });
-    this.#input.addEventListener('change', () => this.#rename());
-    this.#input.addEventListener('focus', () => this.#input.select());
-    store.on('hello', () => this.#greet());
-    this.#greet();
-  }
-
-  #greet() {
-    if (this.#store.me.id === '') {
+  const greet = () => {
+    if (store.me.id === '') {
       return;
     }
     const kept = local.get(KEY);
     if (kept) {
-      this.#connection.send({ type: 'name', name: kept });
+      connection.send({ type: 'name', name: kept });
     }
-    if (document.activeElement !== this.#input) {
-      this.#input.value = kept ?? this.#store.me.name;
+    if (document.activeElement !== input) {
+      input.value = kept ?? store.me.name;
     }
-  }
-
-  #rename() {
-    const name = this.#input.value.trim();
+  };
+  input.addEventListener('change', () => {
+    const name = input.value.trim();
     if (name === '') {
-      this.#input.value = this.#store.me.name;
+      input.value = store.me.name;
       return;
     }
-    this.#store.me.name = name;
+    store.me.name = name;
     local.set(KEY, name);
-    this.#connection.send({ type: 'name', name });
-  }
+    connection.send({ type: 'name', name });
+  });
+  input.addEventListener('focus', () => input.select());
+  store.on('hello', greet);
+  greet();
+  return element('form', { class: 'name-field', on: { submit: (event) => {
+    event.preventDefault();
+    // Leaving the field returns the keys to the vehicle.
+    input.blur();
+  } } }, element('label', { for: 'my-name', text: 'You are' }), input);
 }

@@ -8,7 +8,7 @@ import type { Store } from '../store.js';
 // Time after which the request has failed: a vehicle is put back within a step, but the event
 // takes longer to reach the page [ms].
 const IN_VAIN_MS = 1000;
-export const IN_VAIN = 'Not put back: no place is free on the lane, or the contact is more than '
+const IN_VAIN = 'Not put back: no place is free on the lane, or the contact is more than '
   + '20 m away. Keep Backspace held until there is one.';
 
 /** The watch; one per page. */
@@ -23,7 +23,6 @@ export class PutBackNotice {
 
   /**
    * Update with the driver's input; holding the control requests once.
-   *
    * @param asked whether the driver requests to be put back
    */
   update(seat: string | null, asked: boolean) {
@@ -44,7 +43,7 @@ export class PutBackNotice {
 }
 
 /** @returns whether a contact has stopped the vehicle, and it was not put back since */
-export function standsAtContact(fired: FiredEvent[], seat: string): boolean {
+function standsAtContact(fired: FiredEvent[], seat: string): boolean {
   const last = fired.findLast(({ by, name }) => (by === 'contact'
     ? name.split(' ')[2] === seat : by === 'driver' && name.endsWith(` ${seat}`)));
   return last?.by === 'contact';

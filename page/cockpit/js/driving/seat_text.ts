@@ -18,7 +18,6 @@ const GAME_DRIVERS = new Map<string, (rest: string) => string>([
 
 /**
  * Return a text that says what drives a seat.
- *
  * @param role 'human' or 'autonomous'
  * @param planner name of the AV's planner
  * @param me id of this client

@@ -21,7 +21,6 @@ export class SpeedLimits {
   #lanes: Lane[] = [];
   #scene;
 
-  /** @param scene the scene document */
   constructor(scene: Scene | null) {
     this.#scene = scene;
     for (const lanelet of scene?.lanelets ?? []) {
@@ -52,7 +51,6 @@ export class SpeedLimits {
   /**
    * Return the limit of the lane under a vehicle; at a crossing, of the lane that fits its
    * heading.
-   *
    * @param x of the vehicle [m]
    * @param y of the vehicle [m]
    * @param yaw of the vehicle [rad]

@@ -37,12 +37,7 @@ export interface Shown extends Alarm, Chip {
   mine: boolean;
 }
 
-/**
- * Show the alarms.
- *
- * @param root #alarms in the header
- * @returns kinds: those on the page now
- */
+/** Show the alarms; return the `kinds` on the page now; `root`: #alarms in the header. */
 export function createAlarms(root: HTMLElement, store: Store): { kinds: () => string[] } {
   const frame = part(document.body, 'alarm-frame');
   const signs = part(document.body, 'alarm-signs');
@@ -88,17 +83,8 @@ export function createAlarms(root: HTMLElement, store: Store): { kinds: () => st
     paint(frame, signs, alarms);
     fitWords(root);
   };
-  let run = '';
-  store.on('alarms', update);
-  store.on('seats', update);
-  store.on('status', (status) => {
-    if (status.run !== run) {
-      run = status.run;
-      update();
-    }
-  });
+  store.on(['alarms', 'seats', 'run', 'connection'], update);
   window.addEventListener('resize', () => fitWords(root));
-  store.on('connection', update);
   update();
   // A page that has just been opened is given time to connect.
   setTimeout(() => {
@@ -112,12 +98,11 @@ export function createAlarms(root: HTMLElement, store: Store): { kinds: () => st
  * Return whether an alarm concerns the vehicle that this page drives or, without one, follows.
  * An alarm that is not about a vehicle concerns every page.
  */
-function concerns({ subject }: Alarm, { scene, seats, me }: Store) {
+function concerns({ subject }: Alarm, { scene, own }: Store) {
   if (!scene?.vehicles.some(({ id }) => id === subject)) {
     return true;
   }
-  const seat = Object.keys(seats).find((id) => me.id !== '' && seats[id].holder === me.id);
-  return subject === (seat ?? window.crgame?.world?.followed ?? subject);
+  return subject === (own[0] ?? window.crgame?.world?.followed ?? subject);
 }
 
 /** Return the page's own alarms: that the server has become silent. */

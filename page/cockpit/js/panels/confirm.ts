@@ -6,11 +6,7 @@ import { element, setText } from '../dom.js';
 
 let dialog: ReturnType<typeof build> | null = null;
 
-/**
- * Ask, and wait for the answer.
- *
- * @param verb on the button that confirms
- */
+/** Ask, and wait for the answer; `verb` on the button that confirms. */
 export function confirm(question: string, consequence: string, verb: string): Promise<boolean> {
   dialog ??= build();
   return dialog.ask(question, consequence, verb);

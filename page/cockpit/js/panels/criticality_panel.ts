@@ -41,12 +41,7 @@ const QUANTITIES: Quantity[] = [
 // Its value is that of the time gap.
 const TWICE = 'thw';
 
-/**
- * Make the panel.
- *
- * @param root #panel-criticality
- * @returns its plots
- */
+/** Make the panel; return its plots. */
 export function createCriticality(root: HTMLElement, store: Store): HistoryPanel {
   const tables = element('div', {});
   const plots = element('div', { class: 'history' });

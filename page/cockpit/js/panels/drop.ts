@@ -4,7 +4,6 @@
 
 /**
  * Accept files that are dropped on the page, so that the browser does not open them.
- *
  * @param zone gets data-over while a drop would be accepted
  * @param taken gets the files
  */

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Texts that describe an event of a game and the condition under which it fires. */
 
+import { KMH } from '../units.js';
 import { fixed, NONE } from './format.js';
 
 import type {
@@ -12,7 +13,6 @@ const THINGS: Record<string, string> = {
   constructionZone: 'a construction zone', parkedVehicle: 'a parked vehicle',
   roadBoundary: 'a barrier', unknown: 'an obstacle',
 };
-const KMH = 3.6;
 
 const ACTIONS: {
   [Kind in EventAction['kind']]: (event: Extract<EventAction, { kind: Kind }>) => string
@@ -38,10 +38,7 @@ const TITLES: Record<EventAction['kind'], string> = {
   planner_run: 'Planner stop or go',
 };
 
-/**
- * @param event an entry of scene.events
- * @returns its kind in words
- */
+/** Return the kind of an entry of scene.events in words. */
 export function eventKind(event: GameEvent): string {
   return Object.hasOwn(TITLES, event.kind) ? TITLES[event.kind]
     : String(event.kind ?? '').replaceAll('_', ' ');

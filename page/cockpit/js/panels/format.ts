@@ -5,10 +5,7 @@
 /** Placeholder for a missing value. */
 export const NONE = '–';
 
-/**
- * @param digits after the point
- * @returns with a true minus sign; NONE if it is not a number
- */
+/** Return a number with a true minus sign; NONE if it is none; `digits` after the point. */
 export function fixed(value: number | null | undefined, digits: number): string {
   if (value === null || value === undefined || !Number.isFinite(Number(value))) {
     return NONE;
@@ -18,18 +15,12 @@ export function fixed(value: number | null | undefined, digits: number): string 
   return rounded.replace('-', '−');
 }
 
-/**
- * @param seconds simulation time [s]
- * @returns as the clock in the header shows it: 65.2 s
- */
+/** Return a simulation time as the clock in the header shows it: 65.2 s. */
 export function clockTime(seconds: number | null | undefined): string {
   return Number.isFinite(seconds) ? `${fixed(seconds, 1)} s` : NONE;
 }
 
-/**
- * @param value a whole number
- * @returns with thin spaces between thousands
- */
+/** Return a whole number with thin spaces between thousands. */
 export function count(value: number | null | undefined): string {
   return fixed(value, 0).replace(/\B(?=(\d{3})+(?!\d))/g, '\u202f');
 }
@@ -44,10 +35,7 @@ export function plural(number: number, one: string, many = `${one}s`): string {
   return `${number} ${number === 1 ? one : many}`;
 }
 
-/**
- * @param error what was thrown
- * @returns its message
- */
+/** Return the message of what was thrown. */
 export function errorText(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
@@ -57,7 +45,6 @@ const TURNING = /[\u0590-\u08ff\u200e\u200f\u202a-\u202e\u2066-\u2069]/;
 
 /**
  * Isolate a foreign text, so that its direction does not affect its neighbours.
- *
  * @returns the same, or between the signs that isolate it (Unicode's FSI and PDI)
  */
 export function isolated(text: string): string {

@@ -34,11 +34,6 @@ const THEME = [...COLOURS.human, ...COLOURS.autonomous, 'accent', 'border', 'tex
 
 /** The panel's parts and choices. */
 export class HistoryPanel {
-  /** Script time of the last redrawing of one plot [ms]. */
-  cost_ms = 0;
-  /** Redrawings so far. */
-  redrawn = 0;
-
   #root;
   #store;
   #quantities;
@@ -65,10 +60,7 @@ export class HistoryPanel {
   #hint = element('p', { class: 'hint', text: 'Loading the plots …' });
   #body = element('div', { class: 'charts' });
 
-  /**
-   * @param root in a panel, or the panel
-   * @param quantities that are plotted
-   */
+  /** `root` in a panel, or the panel; `quantities` that are plotted. */
   constructor(root: HTMLElement, store: Store, quantities: Quantity[]) {
     this.#root = root;
     this.#store = store;
@@ -131,10 +123,7 @@ export class HistoryPanel {
     this.#redrawAll();
   }
 
-  /**
-   * @param id of a vehicle
-   * @param on whether it is plotted
-   */
+  /** `id` of a vehicle; `on`: whether it is plotted. */
   select(id: string, on: boolean) {
     if (on) {
       this.#selected.add(id);
@@ -159,8 +148,7 @@ export class HistoryPanel {
   /** Select the vehicle that this page drives, or the first, until the user chooses. */
   #selectOwn() {
     const vehicles = this.#store.scene?.vehicles ?? [];
-    const own = vehicles.find(
-      (vehicle) => this.#store.seats[vehicle.id]?.holder === this.#store.me.id);
+    const own = vehicles.find(({ id }) => this.#store.holds(id));
     if (!this.#chosen && vehicles.length > 0 && (own || this.#selected.size === 0)) {
       this.#selected = new Set([(own ?? vehicles[0]).id]);
       this.#showChips();
@@ -230,7 +218,6 @@ export class HistoryPanel {
       this.#due_ms = now_ms + PERIOD_MS;
       this.#redrawAll();
     }
-    const before_ms = performance.now();
     if (this.#waiting.length > 0 && this.#pasts === null) {
       this.#pasts = this.#gather();
       return;
@@ -238,8 +225,6 @@ export class HistoryPanel {
     const chart = this.#waiting.shift();
     if (chart !== undefined) {
       this.#draw(chart, this.#pasts ?? []);
-      this.cost_ms = performance.now() - before_ms;
-      this.redrawn += 1;
     }
   }
 
@@ -327,11 +312,7 @@ function childrenOf(root: HTMLElement): HTMLElement[] {
   return [...root.children] as HTMLElement[];
 }
 
-/**
- * Make the panel.
- *
- * @param root #panel-history
- */
+/** Make the panel. */
 export function createHistory(root: HTMLElement, store: Store): HistoryPanel {
   return new HistoryPanel(root, store, QUANTITIES);
 }

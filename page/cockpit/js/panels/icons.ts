@@ -41,12 +41,7 @@ const PATHS: Record<string, string> = {
   clock: 'M12 3a9 9 0 1 0 .01 0zM12 7v5l3.5 2',
 };
 
-/**
- * Make an icon.
- *
- * @param name one of PATHS
- * @returns decoration only: hidden from screen readers
- */
+/** Make an icon, a decoration hidden from screen readers; `name`: one of PATHS. */
 export function icon(name: string): SVGElement {
   return svg('svg', {
     viewBox: '0 0 24 24', class: `line-icon line-icon-${name}`, 'aria-hidden': 'true',

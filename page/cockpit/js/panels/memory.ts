@@ -55,18 +55,12 @@ export const local = new Memory('localStorage');
 /** Kept as long as the tab lives. */
 export const session = new Memory('sessionStorage');
 
-/**
- * @param name of a preference
- * @returns its value; empty if none was kept
- */
+/** Return the value of a preference, empty if none was kept. */
 export function recall(name: string): string {
   return local.get(PREFIX + name) ?? '';
 }
 
-/**
- * @param name of a preference
- * @param value to keep; an empty one forgets it
- */
+/** Keep the value of a preference; an empty one forgets it. */
 export function remember(name: string, value: string) {
   if (value === '') {
     local.remove(PREFIX + name);

@@ -13,11 +13,7 @@ import type { Store } from '../store.js';
 const STAYS_MS: Record<NoticeLevel, number> = { info: 5000, warn: 9000, error: 0 };
 const MOST = 4;
 
-/**
- * Show the notices of the server and of the page's own parts.
- *
- * @param root #notices
- */
+/** Show the notices of the server and of the page's own parts. */
 export function createNotices(root: HTMLElement,
   store: Store): { show: (level: NoticeLevel, text: string) => void } {
   const shown = new Map<string, Toast>();

@@ -4,18 +4,16 @@
 
 import { scoreBlock } from '../after/score.js';
 import { element, setAttribute } from '../dom.js';
-import { reasonAgainst, reasonAgainstOrder, reasonAgainstSeat } from '../rights.js';
+import { reasonAgainst, reasonAgainstOrder, reasonAgainstSeat, tellRefusal } from '../rights.js';
 import { confirm } from './confirm.js';
 import { clockTime, oneLine } from './format.js';
 import { icon } from './icons.js';
-import { mishapsOf } from './mishaps.js';
-import { figures, fileList, table } from './outcome_card.js';
-import { RunResult } from './run_result.js';
+import { figures, fileList, RunResult, table } from './outcome_card.js';
 
 import type { Connection } from '../connection.js';
 import type { Reply, RunAction, RunState } from '../messages.js';
-import type { Result } from './outcome_card.js';
 import type { Store } from '../store.js';
+import type { Result } from './outcome_card.js';
 
 // How long a mishap is shown to its driver while the run continues [ms].
 const MISHAP_MS = 10000;
@@ -61,7 +59,7 @@ export type Facts = { phase: 'none'; run?: undefined } | { phase: 'closed' } | C
   | Ready | MishapFacts;
 
 /** The card; one per page. */
-class Outcome {
+export class Outcome {
   #root;
   #store;
   #connection;
@@ -86,9 +84,7 @@ class Outcome {
         this.#result.clearFiles();
       }
     });
-    for (const name of ['hello', 'you', 'scene', 'seats', 'status', 'connection'] as const) {
-      store.on(name, () => this.#show());
-    }
+    store.on(['hello', 'you', 'scene', 'seats', 'status', 'connection'], () => this.#show());
     store.on('epoch', () => {
       this.#told = 0;
       this.#held = false;
@@ -152,7 +148,7 @@ class Outcome {
       }
       return { phase: 'over', connected, against, ...this.#result.of(status, scene) };
     }
-    const mine = Object.keys(seats).find((id) => seats[id].holder === me.id) ?? null;
+    const mine = this.#store.own[0] ?? null;
     const mishaps = mine === null || !connected ? [] : mishapsOf(this.#store, mine);
     const last = mishaps.at(-1);
     if (this.#held && status.run === 'paused' && last !== undefined) {
@@ -232,15 +228,15 @@ class Outcome {
     if (status?.run === 'running' && !await this.#order('pause')) {
       return false;
     }
-    while (this.#store.status?.run === 'running') {
+    while (this.#store.connected && this.#store.status?.run === 'running') {
       await new Promise((resolve) => {
-        const end = this.#store.on('status', () => {
+        const end = this.#store.on(['status', 'connection'], () => {
           end();
           resolve(undefined);
         });
       });
     }
-    return this.#store.epoch === epoch;
+    return this.#store.epoch === epoch && this.#store.status?.run !== 'running';
   }
 
   #card(facts: Card): Node[] {
@@ -340,12 +336,8 @@ class Outcome {
   }
 
   /** @returns whether it was done */
-  async #ask(reply: Promise<Reply>): Promise<boolean> {
-    const { ok, text } = await reply;
-    if (!ok) {
-      this.#store.receive({ type: 'notice', level: 'warn', text });
-    }
-    return ok;
+  #ask(reply: Promise<Reply>): Promise<boolean> {
+    return tellRefusal(this.#store, reply);
   }
 }
 
@@ -358,11 +350,20 @@ function driverText({ seat, run, holder, holderName, me }: Awaiting) {
   return `${seat} waits: ${whose} off the controls.`;
 }
 
+interface Mishap { t: number; touched: boolean; text: string }
+
 /**
- * Make the card.
- *
- * @param root #outcome
+ * Return the contacts and road departures of a vehicle, in the order of time.
+ * @param mine the vehicle
  */
-export function createOutcome(root: HTMLElement, store: Store, connection: Connection): Outcome {
-  return new Outcome(root, store, connection);
+function mishapsOf({ status }: Store, mine: string): Mishap[] {
+  const { contacts = [], departures = [] } = status ?? {};
+  const touched = (t: number, other: string): Mishap => ({
+    t, touched: true, text: `You touched ${oneLine(other)} at ${clockTime(t)}.` });
+  return [
+    ...contacts.filter((item) => item.vehicle === mine || item.with === mine).map(
+      (item) => touched(item.t, item.vehicle === mine ? item.with : item.vehicle)),
+    ...departures.filter(({ vehicle }) => vehicle === mine).map(({ t }) => ({
+      t, touched: false, text: `You left the road at ${clockTime(t)}.` })),
+  ].sort((a, b) => a.t - b.t);
 }

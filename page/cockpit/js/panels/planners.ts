@@ -5,6 +5,7 @@
 import { element, setAttribute, setText } from '../dom.js';
 import { countText } from '../perception/unseen.js';
 import { reasonAgainst } from '../rights.js';
+import { DEGREES } from '../units.js';
 import { baseName } from './event_words.js';
 import { count, fixed, oneLine } from './format.js';
 import { icon } from './icons.js';
@@ -29,14 +30,10 @@ const TRACKING_TITLE = "Deviation from the middle of its route's lane, and from 
 // Of a tracked AV: name of the error, factor to the unit, unit, digits.
 const ERRORS: [name: string, factor: number, unit: string, digits: number][] = [
   ['lane', 1, 'm', 2], ['lateral', 1, 'm', 2], ['along', 1, 'm', 2],
-  ['heading', 180 / Math.PI, '°', 1], ['speed', 1, 'm/s', 2],
+  ['heading', DEGREES, '°', 1], ['speed', 1, 'm/s', 2],
 ];
 
-/**
- * Make the table.
- *
- * @param root #panel-timing
- */
+/** Make the table. */
 export function createPlanners(root: HTMLElement, store: Store, connection: Connection) {
   const empty = element('p', { class: 'hint', text: 'No autonomous vehicle takes part.' });
   const table = element('table', { class: 'planners' },
@@ -72,8 +69,7 @@ export function createPlanners(root: HTMLElement, store: Store, connection: Conn
     update();
   };
   store.on('scene', rebuild);
-  store.on('status', update);
-  store.on('connection', update);
+  store.on(['status', 'connection'], update);
   new MutationObserver(update).observe(root, { attributeFilter: ['hidden'] });
   rebuild();
 }

@@ -17,7 +17,6 @@ let loading: Promise<Plotly> | null = null;
 
 /**
  * Load the library once; after a failure the next call tries again.
- *
  * @throws {Error} if it cannot be loaded
  */
 export function loadPlotly(): Promise<Plotly> {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The quantities of the history panel, and how they are derived from received data. */
 
+import { DEGREES } from '../units.js';
 import { thin, unwrap } from './series.js';
 
 import type { Limits } from '../criticality.js';
@@ -11,7 +12,6 @@ import type { Exposure, SceneVehicle } from '../messages.js';
 import type { ChartView } from './chart.js';
 import type { HealthLog } from './series.js';
 
-const DEGREES = 180 / Math.PI;
 const DASHES = ['solid', 'dot', 'dash'];
 
 // A line: a column of vehicles' states, a figure of the run's health, the latency of planners,
@@ -95,11 +95,7 @@ export const QUANTITIES: Quantity[] = [
   { key: 'latency', title: 'Plan latency', unit: 'ms', digits: 0, lines: [{ latency: true }] },
 ];
 
-/**
- * Make the lines of a quantity.
- *
- * @param data of the vehicles that are selected
- */
+/** Make the lines of a quantity; `data` of the vehicles that are selected. */
 export function traces(quantity: Quantity, data: PlotData, view: PlotWindow): Trace[] {
   return quantity.lines.flatMap((line, i) => {
     if ('health' in line) {

@@ -4,7 +4,6 @@
 
 import { element, setAttribute, setText } from '../dom.js';
 import { reasonAgainst } from '../rights.js';
-import { Busy } from './busy.js';
 import { confirm } from './confirm.js';
 import { acceptDrops } from './drop.js';
 import { errorText, oneLine, plural } from './format.js';
@@ -14,8 +13,8 @@ import { ScenarioForm } from './scenario_form.js';
 import { ScenarioList } from './scenario_list.js';
 import { ScenarioPreview } from './scenario_preview.js';
 
-import type { Connection } from '../connection.js';
 import type { Entry, Offer, Preview } from '../api_messages.js';
+import type { Connection } from '../connection.js';
 import type { Store } from '../store.js';
 
 // A larger file is not sent, because the server would refuse it [bytes].
@@ -35,7 +34,7 @@ class ScenarioPanel {
   #list = new ScenarioList((entry) => this.choose(entry.id),
     (entry) => this.#delete(entry));
   #form = new ScenarioForm();
-  #busy = new Busy();
+  #busy = busyBar();
   #canvas = element('canvas', { class: 'preview', 'aria-label': 'Preview of the scenario' });
   #drawing = new ScenarioPreview(this.#canvas);
   #facts = element('p', { class: 'dim' });
@@ -288,11 +287,7 @@ function wrongFiles(files: File[]) {
   return file.size > LARGEST_FILE ? `${file.name} is larger than 64 MB.` : '';
 }
 
-/**
- * Create the panel, which fetches its list when it is first shown.
- *
- * @param root #panel-scenario
- */
+/** Create the panel, which fetches its list when it is first shown. */
 export function createScenario(root: HTMLElement, store: Store,
   connection: Connection): ScenarioPanel {
   const replay = element('p', {
@@ -312,8 +307,42 @@ export function createScenario(root: HTMLElement, store: Store,
     }
   };
   new MutationObserver(seen).observe(root, { attributeFilter: ['hidden'] });
-  store.on('hello', seen);
-  store.on('you', seen);
+  store.on(['hello', 'you'], seen);
   seen();
   return panel;
+}
+
+const SHOWN_AFTER_MS = 300;
+const COUNTED_AFTER_S = 2;
+
+/** Make a moving bar for a long task, with a text and the elapsed seconds, hidden until begun. */
+function busyBar() {
+  const text = element('span', {});
+  const root = element('div', { class: 'busy', role: 'status', hidden: true },
+    element('div', { class: 'busy-bar', 'aria-hidden': 'true' }), text);
+  let [timer, since, words] = [0, 0, ''];
+  const show = () => {
+    const passed_ms = performance.now() - since;
+    root.hidden = passed_ms < SHOWN_AFTER_MS;
+    const seconds = Math.floor(passed_ms / 1e3);
+    setText(text, seconds >= COUNTED_AFTER_S ? `${words} ${seconds} s` : words);
+  };
+  return {
+    root,
+    /** Start, or change the words of what is done; the seconds count from the first call. */
+    describe(what: string) {
+      words = what;
+      if (timer === 0) {
+        since = performance.now();
+        timer = setInterval(show, 100);
+      }
+      show();
+    },
+    /** Hide it. */
+    end() {
+      clearInterval(timer);
+      timer = 0;
+      root.hidden = true;
+    },
+  };
 }

@@ -19,10 +19,7 @@ export function fetchScenarios(): Promise<Offer> {
   return ask('/api/scenarios');
 }
 
-/**
- * @param id of an entry
- * @param signal aborts it
- */
+/** `id` of an entry; `signal`: aborts it. */
 export function fetchPreview(id: string, signal: AbortSignal): Promise<Preview> {
   return ask(`/api/preview?id=${encodeURIComponent(id)}`, { signal });
 }
@@ -34,10 +31,7 @@ export async function fetchPlannerOptions(planner: string): Promise<PlannerOptio
   return options;
 }
 
-/**
- * @param file a CommonRoad file
- * @returns id of its entry
- */
+/** Return the id of the entry of a CommonRoad file. */
 export async function upload(file: File): Promise<string> {
   const reply = await ask<{ id: string }>(`/api/upload?name=${encodeURIComponent(file.name)}`, {
     method: 'POST', body: file, headers: { ...own(), 'Content-Type': 'application/xml' },
@@ -45,19 +39,12 @@ export async function upload(file: File): Promise<string> {
   return reply.id;
 }
 
-/**
- * @param id of an upload
- * @returns what was done
- */
-export async function deleteUpload(id: string): Promise<string> {
-  const reply = await post<Reply>('/api/upload/delete', { id });
-  return oneLine(reply.text);
+/** @param id of an upload */
+export function deleteUpload(id: string): Promise<Reply> {
+  return post('/api/upload/delete', { id });
 }
 
-/**
- * @param choice id, humans [{id, driver}], avs [{id, planner, options}]
- * @returns what was done
- */
+/** Load a choice: id, humans [{id, driver}], avs [{id, planner, options}]; return what it did. */
 export async function load(choice: Choice): Promise<string> {
   const reply = await post<Reply>('/api/load', choice);
   return oneLine(reply.text);
@@ -65,7 +52,6 @@ export async function load(choice: Choice): Promise<string> {
 
 /**
  * Send the server JSON.
- *
  * @returns as `ask`
  * @throws {Error} with one readable line
  */
@@ -76,7 +62,6 @@ export function post<Content>(path: string, content: unknown): Promise<Content> 
 
 /**
  * Ask the server for JSON.
- *
  * @returns the server's answer, of the type of this path
  * @throws {Error} with one readable line
  */

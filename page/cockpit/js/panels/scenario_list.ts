@@ -28,10 +28,7 @@ export class ScenarioList {
     entry: Entry; button: HTMLButtonElement; item: HTMLElement; words: string }>();
   root;
 
-  /**
-   * @param chosen called with the chosen entry
-   * @param unwanted called with the upload to delete
-   */
+  /** `chosen` called with the chosen entry; `unwanted` called with the upload to delete. */
   constructor(chosen: (entry: Entry) => void, unwanted: (entry: Entry) => void) {
     this.#chosen = chosen;
     this.#unwanted = unwanted;
@@ -43,10 +40,7 @@ export class ScenarioList {
       this.#nothing);
   }
 
-  /**
-   * @param folders of /api/scenarios
-   * @param chosen id of the entry that is marked, empty for none
-   */
+  /** `folders` of /api/scenarios; `chosen`: id of the entry that is marked, empty for none. */
   show(folders: Offer['folders'], chosen: string) {
     this.#entries.clear();
     this.#list.replaceChildren(...folders.filter((folder) => folder.entries.length > 0).map(

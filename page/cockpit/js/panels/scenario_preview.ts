@@ -3,11 +3,10 @@
 /** A small drawing of a scenario at its beginning. */
 
 import { outlineOf } from '../outline.js';
-import { onThemeChange, themeColor } from '../world/palette.js';
+import { colorNameOf, onThemeChange, themeColor } from '../world/palette.js';
 
 import type { Preview } from '../api_messages.js';
-import type { Box, Scene, SceneObject, Shape } from '../messages.js';
-import type { ColorName } from '../world/palette.js';
+import type { Box, Scene, Shape } from '../messages.js';
 
 const MARGIN_PX = 8;
 // Least drawn size, so that vehicles are visible on a long road [px].
@@ -20,7 +19,6 @@ const LANE_PX = 4;
 // Else: margin around the vehicles [m], and the overview's share of the height.
 const AROUND_M = 30;
 const OVERVIEW = 0.25;
-const VULNERABLE = new Set(['pedestrian', 'bicycle', 'motorcycle']);
 
 export interface Area { x: number; y: number; width: number; height: number } // of the canvas [px]
 
@@ -90,12 +88,12 @@ function drawScene(context: CanvasRenderingContext2D, { scene, states }: Preview
   drawRoads(context, scene, scale);
   scene.objects.forEach((object, i) => drawBody(context, {
     shape: object.shape, pose: pose(states.objects, i), ahead: 0,
-    fill: themeColor(objectColour(object)), scale,
+    fill: themeColor(colorNameOf(object)), scale,
   }));
   scene.vehicles.forEach((vehicle, i) => drawBody(context, {
     shape: vehicle.shape, pose: pose(states.vehicles, i),
     ahead: vehicle.rear_to_center, scale, edge: themeColor('map-outline'),
-    fill: themeColor(vehicle.role === 'human' ? 'human' : 'av'),
+    fill: themeColor(colorNameOf(vehicle)),
   }));
   context.restore();
 }
@@ -195,14 +193,6 @@ function drawRoads(context: CanvasRenderingContext2D, scene: Scene, scale: numbe
     context.fill();
   }
   context.globalAlpha = 1;
-}
-
-function objectColour(object: SceneObject): ColorName {
-  if (VULNERABLE.has(object.type)) {
-    return 'vulnerable';
-  }
-  const { role } = object;
-  return role === 'static' || role === 'traffic' || role === 'scripted' ? role : 'recorded';
 }
 
 function drawBody(context: CanvasRenderingContext2D,

@@ -11,7 +11,6 @@ export const MOST_POINTS = 400;
  * Thin out a series: the lowest and the highest value of each time interval remain, in order.
  * Intervals begin at multiples of their length, so that the plot does not flicker while the
  * window moves.
- *
  * @param t increasing [s]
  * @param values as many; NaN makes a gap
  * @param from first time wanted [s]
@@ -64,7 +63,6 @@ export function thin(t: number[], values: number[], from: number,
 
 /**
  * Remove the jumps of a whole turn from a series of angles.
- *
  * @param angles [rad]
  * @returns [rad], starting between -pi and pi
  */
@@ -139,10 +137,7 @@ export class HealthLog {
     return this.#rows.map((row) => row.t);
   }
 
-  /**
-   * @param name 'step_error' or 'lag'
-   * @returns [ms]
-   */
+  /** Return a figure [ms]; `name`: 'step_error' or 'lag'. */
   column(name: 'step_error' | 'lag'): number[] {
     return this.#rows.map((row) => row[name]);
   }

@@ -14,7 +14,6 @@ const THEMES = [
 /**
  * Create the button that cycles through the themes. Parts that draw with the colours are notified
  * by `onThemeChange` of the world's palette.
- *
  * @param root of the button
  * @returns theme: 'dark', 'light' or '' for the system's
  */

@@ -10,22 +10,13 @@ import { recall, remember } from './memory.js';
 const NARROWEST_REM = 22;
 const WIDEST_SHARE = 0.6;
 
-/**
- * Add the panels, which are empty and hidden.
- *
- * @param root aside#panels
- */
+/** Add the panels, which are empty and hidden; `root`: aside#panels. */
 export function addPanels(root: HTMLElement) {
   root.append(...PANELS.map(({ name }) => element('section', {
     id: `panel-${name}`, class: 'panel', role: 'tabpanel', hidden: true })));
 }
 
-/**
- * Make the tabs.
- *
- * @param root aside#panels
- * @returns show opens a panel by its name
- */
+/** Make the tabs; `show` opens a panel by its name; `root`: aside#panels. */
 export function createTabs(root: HTMLElement): { show: (name: string) => void; current: string } {
   const tabs = new Map<string, HTMLElement>();
   const list = part(root, 'tabs');

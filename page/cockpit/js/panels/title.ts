@@ -9,11 +9,7 @@ import type { Store } from '../store.js';
 
 const PROGRAM = 'crgame';
 
-/**
- * Keep the title up to date.
- *
- * @param root #title
- */
+/** Keep the title up to date. */
 export function createTitle(root: HTMLElement, store: Store) {
   const update = () => {
     const title = isolated(store.scene?.title || PROGRAM);
@@ -22,7 +18,6 @@ export function createTitle(root: HTMLElement, store: Store) {
     document.title = [title, store.mode === 'replay' ? 'replay' : '', PROGRAM]
       .filter((part, i, all) => part && all.indexOf(part) === i).join(' · ');
   };
-  store.on('scene', update);
-  store.on('hello', update);
+  store.on(['scene', 'hello'], update);
   update();
 }

@@ -2,19 +2,17 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The followed AV's perception over the true world: layers, their buttons and a legend. */
 
-import { element, setAttribute, setText } from '../dom.js';
+import { element, setAttribute, setText, svg } from '../dom.js';
 import { OBJECT_WIDTH, VEHICLE_WIDTH } from '../frames.js';
 import { recall, remember } from '../panels/memory.js';
 import { press, toolButton } from '../world/toolbar.js';
-import { EstimateLayer } from './estimate_layer.js';
-import { Legend } from './legend.js';
-import { OccupancyLayer } from './occupancy_layer.js';
-import { RayLayer } from './ray_layer.js';
+import { EstimateLayer, RayLayer } from './estimate_layer.js';
 import { countText, Unseen } from './unseen.js';
 
 import type { Connection } from '../connection.js';
+import type { OccupancyFrame } from '../frames.js';
 import type { Store } from '../store.js';
-import type { DrawLayer, LiveView, Place } from '../world/painter.js';
+import type { DrawLayer, LiveView, Place, View } from '../world/painter.js';
 import type { World } from '../world/world.js';
 
 export type LayerName = 'unseen' | 'rays' | 'estimate' | 'occupancy';
@@ -56,7 +54,7 @@ class Perception {
     this.#store = store;
     this.#connection = connection;
     this.#world = world;
-    this.#legend = new Legend(stage);
+    this.#legend = createLegend(stage);
     this.#addLayers(world);
     this.#group = element('div', { class: 'world-group' });
     stage.querySelector('.world-toolbar')?.append(this.#group);
@@ -97,11 +95,7 @@ class Perception {
     return this.#shows('occupancy') ? this.#occupancy.drawn : 0;
   }
 
-  /**
-   * Return how many of the near objects the followed AV sees.
-   *
-   * @returns null unless it perceives
-   */
+  /** Return how many of the near objects the followed AV sees: null unless it perceives. */
   get count(): { seen: number; near: number; range: number | null } | null {
     const { shown } = this.#world;
     const av = this.#av();
@@ -113,7 +107,6 @@ class Perception {
 
   /**
    * Show or hide a layer, and remember it.
-   *
    * @param name unseen, rays, estimate or occupancy
    * @param on whether it is shown
    */
@@ -224,12 +217,149 @@ class Perception {
   }
 }
 
-/**
- * Put the layers of perception on the world.
- *
- * @param stage that holds the canvas
- */
+/** Put the layers of perception on the world; `stage` that holds the canvas. */
 export function createPerception(stage: HTMLElement, store: Store,
   connection: Connection): Perception {
   return new Perception(stage, store, connection, window.crgame.world);
+}
+
+// name: [strokes in a box of 28 x 16, words]; $ is the AV. The styles are in world.css.
+const ENTRIES: Record<string, [strokes: string, words: string]> = {
+  unseen: ['M14 2a6 6 0 1 0 .01 0z', 'not seen by $'],
+  rays: ['M2 14L26 2V14z', 'what the sensors of $ reach'],
+  estimate: ['M3 4h22v8H3z', 'estimated pose of $, 2σ'],
+  occupancy: ['M3 3h10v10H3zM15 3h10v10H15z', 'permanent obstacles'],
+};
+
+// Replaces the first entry while the planner's knowledge is unknown.
+const UNKNOWN = 'what $ sees is not known now';
+
+/** Put the legend on the stage. */
+function createLegend(stage: HTMLElement) {
+  const root = element('ul', { class: 'world-legend', 'aria-label': 'Legend', hidden: true });
+  const rows = Object.entries(ENTRIES).map(([name, [strokes, words]]) => {
+    const text = element('span', {});
+    const row = element('li', { 'data-layer': name, hidden: true },
+      svg('svg', { viewBox: '0 0 28 16', 'aria-hidden': 'true' }, svg('path', { d: strokes })),
+      text);
+    root.append(row);
+    return { name, words, row, text };
+  });
+  stage.append(root);
+  return {
+    /**
+     * Show the entries of the named layers on the map.
+     * @param av id of the AV that is followed
+     * @param known whether it is known what it sees
+     */
+    show(names: string[], av: string, known: boolean) {
+      for (const { name, words, row, text } of rows) {
+        setText(text, (name === 'unseen' && !known ? UNKNOWN : words).replace('$', av));
+        setAttribute(row, 'hidden', !names.includes(name));
+      }
+      setAttribute(root, 'hidden', names.length === 0);
+    },
+  };
+}
+
+// Cells smaller than this on the screen are merged by fours, repeatedly [px].
+const LEAST_PX = 0.75;
+const COARSEST = 6;
+
+/** Of detail. */
+interface Level {
+  coarseness: number; // its cells are 2 to the power of this as long as the map's
+  rows: number;
+  columns: number;
+  cells: Uint8Array;
+  picture: HTMLCanvasElement | null;
+}
+
+/** The layer that draws the store's map as a picture in the theme's colour. */
+class OccupancyLayer {
+  /** Number of occupied cells in the map that was drawn last. */
+  drawn = 0;
+  #map: OccupancyFrame | null = null;
+  #color = '';
+  #levels: Level[] = [];
+
+  /** Draw the map; `view` as layers get it. */
+  draw(context: CanvasRenderingContext2D, { camera, palette, ratio, store }: View) {
+    const map = store.perceived.occupancy;
+    if (map === null) {
+      this.drawn = 0;
+      return;
+    }
+    if (map !== this.#map) {
+      this.#map = map;
+      const first = firstLevel(map);
+      this.#levels = [first];
+      this.drawn = first.cells.reduce((sum, cell) => sum + cell, 0);
+    }
+    if (palette.occupied !== this.#color) {
+      this.#color = palette.occupied;
+      this.#levels.forEach((level) => { level.picture = null; });
+    }
+    if (this.drawn === 0) {
+      return;
+    }
+    const level = this.#level(map.resolution * camera.scale * ratio);
+    const edge = map.resolution * 2 ** level.coarseness;
+    level.picture ??= paint(level, this.#color);
+    camera.enterMap(context, ratio, map.x, map.y);
+    context.imageSmoothingEnabled = false;
+    context.drawImage(level.picture, 0, 0, level.columns * edge, level.rows * edge);
+  }
+
+  /** Return the finest level whose cells are large enough on the screen. */
+  #level(cell_px: number): Level {
+    let wanted = 0;
+    while (wanted < COARSEST && cell_px * 2 ** wanted < LEAST_PX) {
+      wanted += 1;
+    }
+    while (this.#levels.length <= wanted) {
+      this.#levels.push(coarser(this.#levels[this.#levels.length - 1]));
+    }
+    return this.#levels[wanted];
+  }
+}
+
+function firstLevel({ rows, columns, bits }: OccupancyFrame): Level {
+  const cells = new Uint8Array(rows * columns);
+  for (let i = 0; i < cells.length; i += 1) {
+    cells[i] = bits[i >> 3] >> (i & 7) & 1;
+  }
+  return { coarseness: 0, rows, columns, cells, picture: null };
+}
+
+/** Merge four cells into one, which is occupied if any of them is, so that no wall gets lost. */
+function coarser({ coarseness, rows, columns, cells }: Level): Level {
+  const height = Math.ceil(rows / 2);
+  const width = Math.ceil(columns / 2);
+  const joined = new Uint8Array(height * width);
+  for (let row = 0; row < rows; row += 1) {
+    const into = (row >> 1) * width;
+    for (let column = 0; column < columns; column += 1) {
+      joined[into + (column >> 1)] |= cells[row * columns + column];
+    }
+  }
+  return {
+    coarseness: coarseness + 1, rows: height, columns: width, cells: joined, picture: null,
+  };
+}
+
+function paint({ rows, columns, cells }: Level, color: string) {
+  const canvas = document.createElement('canvas');
+  canvas.width = columns;
+  canvas.height = rows;
+  const context = canvas.getContext('2d') as CanvasRenderingContext2D;
+  const image = context.createImageData(columns, rows);
+  for (let i = 0; i < cells.length; i += 1) {
+    image.data[4 * i + 3] = 255 * cells[i];
+  }
+  context.putImageData(image, 0, 0);
+  context.globalCompositeOperation = 'source-in';
+  context.fillStyle = color;
+  context.fillRect(0, 0, columns, rows);
+  return canvas;
 }

@@ -11,23 +11,18 @@ export class Unseen {
   #scene;
   #flags;
 
-  /** @param scene the scene document */
   constructor(scene: Scene) {
     this.#scene = scene;
     this.#flags = new Uint8Array(scene.vehicles.length + scene.objects.length);
   }
 
-  /**
-   * @param id of a vehicle
-   * @returns its index if it is an AV with perception, else -1
-   */
+  /** Return a vehicle's index if it is an AV with perception, else -1. */
   perceiving(id: string | null): number {
     return this.#scene.vehicles.findIndex((item) => item.id === id && item.perception);
   }
 
   /**
    * Mark the objects that are not seen, whether present or not.
-   *
    * @param av index of the AV
    * @param columns of the seen objects
    * @returns 1 for each vehicle, then object, that is not seen
@@ -43,7 +38,6 @@ export class Unseen {
 
   /**
    * Return how many objects are within an AV's sensor range, and how many of them are seen.
-   *
    * @param av index of the AV
    * @param columns of the seen objects
    * @param shown of Store.displayed
@@ -75,12 +69,7 @@ export class Unseen {
   }
 }
 
-/**
- * Return a count in words.
- *
- * @param count of `Unseen.count`
- * @returns sees 3 of 4 within 80 m
- */
+/** Return a count in words: sees 3 of 4 within 80 m; `count` of `Unseen.count`. */
 export function countText(
   { seen, near, range }: { seen: number; near: number; range: number | null }): string {
   return `sees ${seen} of ${near}${range === null ? '' : ` within ${Math.round(range)} m`}`;

@@ -4,7 +4,7 @@
 
 import { KIND } from '../frames.js';
 
-import type { ReplayInfo } from '../replay_messages.js';
+import type { ReplayInfo } from '../api_messages.js';
 
 // Number of chunks kept: a little more than two seeks and the way between them need; 5 s each.
 const KEPT = 12;
@@ -13,7 +13,6 @@ const RETRY_MS = 1000;
 
 /**
  * Read an answer of the server.
- *
  * @param path below /api/replay/
  * @param query values by name
  * @throws {Error} with a readable text
@@ -31,11 +30,7 @@ function queryOf(query: Record<string, number>) {
   return new URLSearchParams(Object.entries(query).map(([name, value]) => [name, `${value}`]));
 }
 
-/**
- * Split packed frames.
- *
- * @param packed frames, each after its length in bytes
- */
+/** Split packed frames; `packed`: frames, each after its length in bytes. */
 export function unpack(packed: ArrayBuffer): ArrayBuffer[] {
   const view = new DataView(packed);
   const frames = [];
@@ -80,26 +75,19 @@ export class Chunks {
     return this.#chunks.size;
   }
 
-  /**
-   * @param t [s]
-   * @returns the chunk that holds this time
-   */
+  /** Return the chunk that holds a time [s]. */
   numberAt(t: number): number {
     const { start_s, chunk_s, chunks } = this.#info;
     return Math.min(Math.max(Math.floor((t - start_s) / chunk_s + 1e-9), 0), chunks - 1);
   }
 
-  /**
-   * @param number of a chunk
-   * @returns its frames, undefined before they have come
-   */
+  /** Return the frames of a chunk, undefined before they have come. */
   get(number: number): Entry[] | undefined {
     return this.#chunks.get(number);
   }
 
   /**
    * Request a chunk and those after it.
-   *
    * @param number of the chunk that is shown
    * @param ahead how many more
    */

@@ -4,8 +4,8 @@
 
 import { countWhile } from '../search.js';
 
+import type { ReplayInfo, ReplayTracks } from '../api_messages.js';
 import type { RunState, Status, StoreMessage } from '../messages.js';
-import type { ReplayInfo, ReplayTracks } from '../replay_messages.js';
 import type { Store } from '../store.js';
 
 const STATUS_MS = 200;
@@ -43,7 +43,6 @@ export class ReplayDocuments {
 
   /**
    * Set the documents that are valid at a time.
-   *
    * @param now_ms wall time
    * @param jumped whether the time has jumped
    */

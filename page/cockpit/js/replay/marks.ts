@@ -4,7 +4,7 @@
 
 import { element, svg } from '../dom.js';
 
-import type { ReplayMark } from '../replay_messages.js';
+import type { ReplayMark } from '../api_messages.js';
 
 // Shapes on a 12 x 12 grid and the name of each kind; the colours are in replay.css.
 const KINDS = new Map<string, [shape: string, word: string]>([
@@ -26,7 +26,6 @@ const OTHER: [shape: string, word: string] = ['M4 0H8V12H4Z', ''];
 
 /**
  * Return the text of an event.
- *
  * @param event of the replay's info
  * @returns kind, subject, text, count and time
  */
@@ -39,7 +38,6 @@ export function eventText({ kind, subject, text, count, t }: ReplayMark): string
 
 /**
  * Draw the mark of an event.
- *
  * @param event of the replay's info
  * @param share where on the time line, 0 to 1
  * @param chosen called when it is clicked

@@ -7,8 +7,8 @@ import { ReplayDocuments } from './documents.js';
 import { ReplayFeed } from './replay_feed.js';
 import { Timeline } from './timeline.js';
 
+import type { ReplayInfo, ReplayMark } from '../api_messages.js';
 import type { RunState } from '../messages.js';
-import type { ReplayInfo, ReplayMark } from '../replay_messages.js';
 import type { Store } from '../store.js';
 import type { Now } from './documents.js';
 
@@ -45,8 +45,7 @@ export class Player {
         this.open();
       }
     };
-    store.on('hello', open);
-    store.on('connection', open);
+    store.on(['hello', 'connection'], open);
     // After a lost connection the server sends the scene of the run that it shows first.
     store.on('scene', (scene) => {
       if (this.info !== null && scene.time.epoch !== this.info.epoch) {
@@ -105,11 +104,7 @@ export class Player {
     return this.#feed?.chunksHeld ?? 0;
   }
 
-  /**
-   * Show a run from its beginning.
-   *
-   * @param epoch which; the server's choice by default
-   */
+  /** Show a run from its beginning; without `epoch`, the one that the server chooses. */
   async open(epoch?: number): Promise<void> {
     this.#opening = true;
     try {
@@ -146,12 +141,7 @@ export class Player {
     }
   }
 
-  /**
-   * Go to a time.
-   *
-   * @param t [s]; within the recording
-   * @returns when it is shown
-   */
+  /** Go to a time [s] within the recording; return when it is shown. */
   seek(t: number): Promise<void> {
     if (this.info === null) {
       return Promise.resolve();
@@ -166,7 +156,6 @@ export class Player {
 
   /**
    * Go to exactly the next or another scenario step, and pause.
-   *
    * @param count how many steps on, negative for back
    * @returns when it is shown
    */
@@ -184,12 +173,7 @@ export class Player {
     return this.seek(wanted * steps_per_tick * dt_s);
   }
 
-  /**
-   * Go to the next or the previous event.
-   *
-   * @param direction 1 or -1
-   * @returns the event
-   */
+  /** Go to the next or the previous event; return the event; `direction`: 1 or -1. */
   jump(direction: number): ReplayMark | null {
     const events = this.info?.events ?? [];
     const found = direction > 0 ? events.find(({ t }) => t > this.#t + TINY_S)
@@ -279,13 +263,4 @@ export class Player {
       this.#store.receive({ type: 'notice', level: 'error', text });
     }
   }
-}
-
-/**
- * Create the player, which becomes visible when the page shows a recording.
- *
- * @param root footer#timeline
- */
-export function createReplay(root: HTMLElement, store: Store): Player {
-  return new Player(root, store);
 }

@@ -8,9 +8,9 @@ import { addToHistory, emptyHistory } from '../history.js';
 import { countWhile } from '../search.js';
 import { ask, Chunks, unpack } from './chunks.js';
 
+import type { ReplayInfo } from '../api_messages.js';
 import type { StateFrame } from '../frames.js';
 import type { History } from '../history.js';
-import type { ReplayInfo } from '../replay_messages.js';
 import type { Store } from '../store.js';
 import type { Entry } from './chunks.js';
 
@@ -61,7 +61,6 @@ export class ReplayFeed {
 
   /**
    * Request the criticality of the whole run; it takes a while if it was not recorded.
-   *
    * @param log gets it
    */
   async #askCriticality(log: CriticalityLog, refused: (error: Error) => void) {
@@ -79,7 +78,6 @@ export class ReplayFeed {
 
   /**
    * Feed the store with the data of a time.
-   *
    * @param t simulation time [s]
    * @returns the shown time: that of a state close to t, else t; NaN while its data is loading
    */
@@ -102,7 +100,6 @@ export class ReplayFeed {
 
   /**
    * Return a vehicle's motion around the shown time, as `Store.history` does.
-   *
    * @param index of the vehicle
    * @param seconds how far back
    */

@@ -5,7 +5,7 @@
 import { element, setAttribute, setText, svg } from '../dom.js';
 import { eventText, mark } from './marks.js';
 
-import type { ReplayInfo, ReplayMark } from '../replay_messages.js';
+import type { ReplayInfo, ReplayMark } from '../api_messages.js';
 import type { Player } from './player.js';
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
@@ -32,10 +32,7 @@ export class Timeline {
     ...SPEEDS.map((speed) => element('option', { value: speed, text: `× ${speed}` })));
   #told = element('span', { class: 'timeline-event', role: 'status' });
 
-  /**
-   * @param root footer#timeline; hidden until there is a recording
-   * @param player that is controlled
-   */
+  /** `root`: footer#timeline; hidden until there is a recording; `player` that is controlled. */
   constructor(root: HTMLElement, player: Player) {
     this.#root = root;
     this.#player = player;
@@ -70,11 +67,7 @@ export class Timeline {
     window.addEventListener('keydown', (event) => this.#key(event));
   }
 
-  /**
-   * Start showing a run.
-   *
-   * @param info of the run
-   */
+  /** Start showing a run; `info` of the run. */
   show(info: ReplayInfo) {
     this.#root.hidden = false;
     setAttribute(this.#slider, 'min', String(info.first_n));
@@ -113,11 +106,7 @@ export class Timeline {
     }
   }
 
-  /**
-   * Show the event that was jumped to.
-   *
-   * @param event of the run's info
-   */
+  /** Show the event that was jumped to; `event` of the run's info. */
   showEvent(event: ReplayMark) {
     setText(this.#told, eventText(event));
   }

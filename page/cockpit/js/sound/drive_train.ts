@@ -74,7 +74,6 @@ export function engineSpeed_rpm(train: DriveTrain, gear: number, speed: number,
 
 /**
  * Choose the gear: up where the engine turns too fast for the throttle, down where too slowly.
- *
  * @param gear that is in
  * @param speed without a sign [m/s]
  * @param throttle 0 to 1
@@ -95,18 +94,12 @@ export function gearAfter(train: DriveTrain, gear: number, speed: number,
   return next;
 }
 
-/**
- * @param rpm of the engine
- * @returns its strongest tone [Hz]
- */
+/** Return the strongest tone [Hz]; `rpm` of the engine. */
 export function tone_Hz(train: DriveTrain, rpm: number): number {
   return rpm / 60 * train.order;
 }
 
-/**
- * @param rpm of the engine
- * @returns 0 at idling, 1 at the limit
- */
+/** Return 0 at idling, 1 at the limit; `rpm` of the engine. */
 export function speedShare(train: DriveTrain, rpm: number): number {
   return (rpm - train.idle_rpm) / (train.limit_rpm - train.idle_rpm);
 }

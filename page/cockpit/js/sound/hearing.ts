@@ -20,7 +20,6 @@ export interface Arrival { distance: number; pan: number; doppler: number }
 /**
  * Return the Doppler factor in still air: c / (c - v) for a source that approaches at v,
  * (c + v) / c for an ear that does.
- *
  * @param source at which the source approaches the ear [m/s]
  * @param ear at which the ear approaches the source [m/s]
  * @returns heard frequency over the source's
@@ -31,7 +30,6 @@ export function dopplerFactor(source: number, ear: number): number {
 
 /**
  * Return the attenuation: pressure falls with 1 / distance, and fades to 0 at the range.
- *
  * @param distance [m]
  * @returns 1 near by, 0 beyond RANGE_M
  */

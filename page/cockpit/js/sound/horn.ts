@@ -5,7 +5,7 @@
 import { makeFilter, Value } from './voices.js';
 
 /** Frequencies of the two notes [Hz]. */
-export const NOTES_Hz = Object.freeze([420, 500]);
+const NOTES_Hz = Object.freeze([420, 500]);
 const AMPLITUDE = 0.14;
 const ATTACK_S = 0.015;
 const GONE_S = 0.2;
@@ -21,10 +21,7 @@ export class Horn {
     this.#out = out;
   }
 
-  /**
-   * @param doppler by which the notes are shifted
-   * @param when time of the context [s]
-   */
+  /** `doppler` by which the notes are shifted; `when`: time of the context [s]. */
   update(on: boolean, doppler: number, when: number) {
     if (on && this.#sounding === null) {
       this.#sounding = this.#begin(doppler, when);

@@ -37,7 +37,6 @@ export class Kerbs {
 
   /**
    * Return the strongest kerb that the wheels have crossed since the last call.
-   *
    * @param shown current rows
    * @param index of the vehicle
    * @returns how hard it is, 0 to 1; 0 for no kerb
@@ -79,10 +78,7 @@ function kerbsOf({ left, left_line, right, right_line }: Lanelet) {
     { line: right, strength: STRENGTH[right_line] ?? 0 }].filter(({ strength }) => strength > 0);
 }
 
-/**
- * @param at where its row begins
- * @returns where its four wheels stand
- */
+/** Return where its four wheels stand; `at`: where its row begins. */
 function wheelsOf({ shape, wheelbase }: SceneVehicle, rows: Float64Array, at: number): Point[] {
   const [x, y, yaw] = [VEHICLE.x, VEHICLE.y, VEHICLE.yaw].map((column) => rows[at + column]);
   const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
@@ -91,11 +87,7 @@ function wheelsOf({ shape, wheelbase }: SceneVehicle, rows: Float64Array, at: nu
     [x + ahead * cos - left * sin, y + ahead * sin + left * cos])));
 }
 
-/**
- * Return whether a way crosses a line.
- *
- * @param line flat
- */
+/** Return whether a way crosses a line; `line`: flat. */
 function crosses(line: number[], from: Point, to: Point) {
   for (let i = 0; i + 3 < line.length; i += 2) {
     const [one, two]: [Point, Point] = [[line[i], line[i + 1]], [line[i + 2], line[i + 3]]];

@@ -36,52 +36,32 @@ export function engineLevel(train: DriveTrain, rpm: number, load: number): numbe
     : 0.07 + 0.16 * share + 0.12 * load * (0.35 + 0.65 * share);
 }
 
-/**
- * @param speed without a sign [m/s]
- * @returns amplitude of rolling tyres
- */
+/** Return the amplitude of rolling tyres; `speed` without a sign [m/s]. */
 export function tyreLevel(speed: number): number {
   return TYRES.amplitude * (speed / TYRES.at) ** TYRES.exponent;
 }
 
-/**
- * @param speed without a sign [m/s]
- * @returns amplitude of wind
- */
+/** Return the amplitude of wind; `speed` without a sign [m/s]. */
 export function windLevel(speed: number): number {
   return Math.min(WIND.amplitude * (speed / WIND.at) ** WIND.exponent, LOUDEST_WIND);
 }
 
-/**
- * @param deceleration against the motion [m/s^2]
- * @param speed without a sign [m/s]
- * @returns 0 to 1
- */
+/** Return 0 to 1; `deceleration`: against the motion [m/s^2]; `speed` without a sign [m/s]. */
 export function hardBraking(deceleration: number, speed: number): number {
   return smooth(deceleration, SQUEAL_FROM, SQUEAL_FULL) * smooth(speed, 0, CREEP);
 }
 
-/**
- * @param lateral acceleration [m/s^2]
- * @param speed without a sign [m/s]
- * @returns 0 to 1
- */
+/** Return 0 to 1; `lateral`: acceleration [m/s^2]; `speed` without a sign [m/s]. */
 export function cornering(lateral: number, speed: number): number {
   return smooth(Math.abs(lateral), SCREECH_FROM, SCREECH_FULL) * smooth(speed, 0, CREEP);
 }
 
-/**
- * @param speed without a sign [m/s]
- * @returns roughness of the ground beside the road, 0 to 1
- */
+/** Return the roughness of the ground beside the road, 0 to 1; `speed` without a sign [m/s]. */
 export function roughness(speed: number): number {
   return smooth(speed, 0, 15);
 }
 
-/**
- * @param speed without a sign [m/s]
- * @returns strength of a collision, 0 to 1
- */
+/** Return the strength of a collision, 0 to 1; `speed` without a sign [m/s]. */
 export function impact(speed: number): number {
   return 0.35 + 0.65 * smooth(speed, 0, 15);
 }
@@ -94,10 +74,7 @@ export function volumeGain(volume: number): number {
   return volume * volume;
 }
 
-/**
- * @param from below it the result is 0
- * @param to above it the result is 1
- */
+/** `from`: below it the result is 0; `to`: above it the result is 1. */
 function smooth(value: number, from: number, to: number) {
   const share = Math.min(Math.max((value - from) / (to - from), 0), 1);
   return share * share * (3 - 2 * share);

@@ -64,7 +64,6 @@ export class Listener {
 
   /**
    * Return the sounds that are heard.
-   *
    * @param shown rows of the same time
    * @param id of the vehicle or object whose driver listens
    * @returns null if there is no such vehicle now
@@ -162,10 +161,7 @@ function trainOfObject({ type, role, shape }: SceneObject): DriveTrain | null {
     : known ?? (shape.length > LONG_M ? HEAVY : CAR);
 }
 
-/**
- * @param speed without a sign [m/s]
- * @param acceleration along the motion [m/s^2]
- */
+/** `speed` without a sign [m/s]; `acceleration`: along the motion [m/s^2]. */
 function guessThrottle(speed: number, acceleration: number) {
   const holding = HOLDING * Math.min(speed / HELD_FROM, 1);
   return Math.min(Math.max(holding + THROTTLE_PER_ACCELERATION * acceleration, 0), 1);
@@ -182,10 +178,7 @@ function headOf(vehicle: SceneVehicle, rows: Float64Array, index: number): Movin
   return aheadOf(rows, index, ahead, left);
 }
 
-/**
- * @param ahead of the rear axle [m]
- * @param left of it [m]
- */
+/** `ahead` of the rear axle [m]; `left` of it [m]. */
 function aheadOf(rows: Float64Array, index: number, ahead: number, left: number): Moving {
   const at = index * VEHICLE_WIDTH;
   const [yaw, speed] = [rows[at + VEHICLE.yaw], rows[at + VEHICLE.speed]];

@@ -44,10 +44,7 @@ export class OtherVoice {
   #freeAt = 0;
   #connected = false;
 
-  /**
-   * @param out node that it is connected to while it is in use
-   * @param number of this voice
-   */
+  /** `out`: node that it is connected to while it is in use; `number` of this voice. */
   constructor(context: BaseAudioContext, noise: AudioBuffer, out: AudioNode, number: number) {
     this.#context = context;
     this.#out = out;
@@ -72,10 +69,7 @@ export class OtherVoice {
     this.#engine.start();
   }
 
-  /**
-   * @param when time of the context [s]
-   * @returns whether it is free
-   */
+  /** Return whether it is free; `when`: time of the context [s]. */
   isFree(when: number): boolean {
     return this.id === '' && when >= this.#freeAt;
   }
@@ -100,11 +94,7 @@ export class OtherVoice {
     this.#level.to(attenuation(distance), when);
   }
 
-  /**
-   * Fade out and free the voice.
-   *
-   * @param when time of the context [s]
-   */
+  /** Fade out and free the voice; `when`: time of the context [s]. */
   release(when: number) {
     if (this.id !== '') {
       this.id = '';

@@ -58,11 +58,7 @@ export class Rumble {
   // Strongest kerb between two effects.
   #kerb = 0;
 
-  /**
-   * Play the effects on a gamepad.
-   *
-   * @param strength 0 to 1
-   */
+  /** Play the effects on a gamepad; `strength`: 0 to 1. */
   feel(actuator: GamepadHapticActuator, own: Pick<Driven, 'speed' | 'deceleration'>,
     trouble: Trouble, strength: number, now_ms: number) {
     if (this.#running !== null && this.#running !== actuator) {

@@ -3,7 +3,7 @@
 /** Sound and rumble of the vehicle whose seat this page holds, else of the followed one. */
 
 import { connectedPads } from '../driving/gamepad.js';
-import { isTyping } from '../driving/focus.js';
+import { isCommand } from '../driving/focus.js';
 import { recall, remember } from '../panels/memory.js';
 import { Kerbs } from './kerbs.js';
 import { Listener } from './listener.js';
@@ -115,7 +115,6 @@ export class Sound {
 
   /**
    * Choose for this page only: the browser does not remember it, and M has no effect.
-   *
    * @param on starts with the next key, click or button of a gamepad
    */
   want(on: boolean) {
@@ -132,9 +131,7 @@ export class Sound {
   }
 
   #key(event: KeyboardEvent) {
-    const free = !event.repeat && !event.ctrlKey && !event.metaKey && !event.altKey
-      && !isTyping(event.target) && !document.querySelector('dialog[open]');
-    if (event.code === KEY && free && this.#keys && this.allowed) {
+    if (event.code === KEY && !event.repeat && isCommand(event) && this.#keys && this.allowed) {
       event.preventDefault();
       this.toggle();
     } else {
@@ -247,13 +244,4 @@ export class Sound {
 function recallShare(amount: Amount, usual: number) {
   const kept = Number.parseFloat(recall(amount));
   return kept >= 0 && kept <= 1 ? kept : usual;
-}
-
-/**
- * Put the sound's control into the header, and start the sound.
- *
- * @param root of the control
- */
-export function createSound(root: HTMLElement, store: Store, connection: Connection): Sound {
-  return new Sound(root, store, connection);
 }

@@ -7,12 +7,7 @@ import { icon } from '../panels/icons.js';
 
 import type { Amount, Sound } from './sound.js';
 
-/**
- * Make the control.
- *
- * @param root of the button
- * @returns show: updates the control
- */
+/** Make the control, which `show` updates; `root` of the button. */
 export function createSoundControl(root: HTMLElement, sound: Sound): { show: () => void } {
   const button = element('button', {
     type: 'button', id: 'sound', class: 'icon-button', popovertarget: 'sound-panel',

@@ -62,19 +62,13 @@ export class SoundGraph {
       (_, number) => new OtherVoice(context, noise, this.#mix, number));
   }
 
-  /**
-   * Fade in.
-   *
-   * @param gain 0 to 1
-   * @param when time of the context [s]
-   */
+  /** Fade in; `gain`: 0 to 1; `when`: time of the context [s]. */
   open(gain: number, when: number) {
     this.#fade(gain, when);
   }
 
   /**
    * Fade to silence, which is exact after a moment.
-   *
    * @param when time of the context [s]
    * @returns time from which it is silent [s]
    */
@@ -86,11 +80,7 @@ export class SoundGraph {
     return when + FADE_S;
   }
 
-  /**
-   * Set the sounds from a time on.
-   *
-   * @param when time of the context [s]
-   */
+  /** Set the sounds from a time on; `when`: time of the context [s]. */
   update({ t, own, others }: Heard, trouble: Trouble, when: number) {
     this.#engine.update(own, when);
     this.#road.update({ ...own, offRoad: trouble.offRoad }, when);

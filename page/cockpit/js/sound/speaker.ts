@@ -42,11 +42,7 @@ export class Speaker {
     this.#resume();
   }
 
-  /**
-   * Play, from now on.
-   *
-   * @param volume 0 to 1
-   */
+  /** Play, from now on; `volume`: 0 to 1. */
   play(heard: Heard, trouble: Trouble, volume: number) {
     if (this.#context === null || this.#graph === null) {
       return;

@@ -23,7 +23,6 @@ export class Strikes {
 
   /**
    * Play the relay of an indicator.
-   *
    * @param lit whether its lamps go on, which sounds higher
    * @param when time of the context [s]
    */
@@ -31,33 +30,20 @@ export class Strikes {
     this.#burst(when, 0.5, 0.006, makeFilter(this.#context, 'bandpass', lit ? 2900 : 2200, 3));
   }
 
-  /**
-   * Play wheels that cross a kerb.
-   *
-   * @param strength 0 to 1
-   * @param when time of the context [s]
-   */
+  /** Play wheels that cross a kerb; `strength`: 0 to 1; `when`: time of the context [s]. */
   kerb(strength: number, when: number) {
     this.#thump(when, 0.45 * strength, 0.05, 75);
     this.#burst(when, 0.25 * strength, 0.03, makeFilter(this.#context, 'lowpass', 700));
   }
 
-  /**
-   * Play a collision.
-   *
-   * @param strength 0 to 1
-   * @param when time of the context [s]
-   */
+  /** Play a collision; `strength`: 0 to 1; `when`: time of the context [s]. */
   collision(strength: number, when: number) {
     this.#thump(when, 0.9 * strength, 0.12, 55);
     this.#burst(when, 1.2 * strength, 0.09, makeFilter(this.#context, 'lowpass', 1500));
     this.#burst(when + 0.03, 0.4 * strength, 0.22, makeFilter(this.#context, 'bandpass', 3200, 2));
   }
 
-  /**
-   * @param when [s]
-   * @param decay_s time constant [s]
-   */
+  /** `when` [s]; `decay_s`: time constant [s]. */
   #burst(when: number, amplitude: number, decay_s: number, filter: BiquadFilterNode) {
     const source = this.#context.createBufferSource();
     source.buffer = this.#noise;
@@ -66,11 +52,7 @@ export class Strikes {
     source.stop(when + TIME_CONSTANTS * decay_s);
   }
 
-  /**
-   * @param when [s]
-   * @param decay_s time constant [s]
-   * @param frequency at which it begins, and falls [Hz]
-   */
+  /** `when` [s]; `decay_s`: time constant [s]; `frequency`: at which it begins, and falls [Hz]. */
   #thump(when: number, amplitude: number, decay_s: number, frequency: number) {
     const source = this.#context.createOscillator();
     source.frequency.setValueAtTime(frequency, when);
@@ -80,10 +62,7 @@ export class Strikes {
     source.stop(when + TIME_CONSTANTS * decay_s);
   }
 
-  /**
-   * @param source stopped at its end
-   * @param when [s]
-   */
+  /** `source`: stopped at its end; `when` [s]. */
   #envelope(source: AudioScheduledSourceNode, when: number, amplitude: number,
     decay_s: number): GainNode {
     const level = this.#context.createGain();

@@ -25,11 +25,7 @@ export class Value {
     param.value = initial;
   }
 
-  /**
-   * Move to a value from a time on.
-   *
-   * @param when time of the context [s]
-   */
+  /** Move to a value from a time on; `when`: time of the context [s]. */
   to(value: number, when: number) {
     if (Math.abs(value - this.#last) > SAME * Math.abs(this.#last)) {
       this.#param.setTargetAtTime(value, when, this.#settle_s);
@@ -37,11 +33,7 @@ export class Value {
     }
   }
 
-  /**
-   * Jump to a value, for a voice that is silent.
-   *
-   * @param when time of the context [s]
-   */
+  /** Jump to a value, for a voice that is silent; `when`: time of the context [s]. */
   jump(value: number, when: number) {
     this.#param.cancelScheduledValues(when);
     this.#param.setValueAtTime(value, when);
@@ -81,7 +73,6 @@ export function makeNoise(context: BaseAudioContext): AudioBuffer {
 
 /**
  * Play noise without end.
- *
  * @param offset_s start in the noise: two players of one noise must differ
  */
 export function playNoise(context: BaseAudioContext, noise: AudioBuffer,
@@ -96,7 +87,6 @@ export function playNoise(context: BaseAudioContext, noise: AudioBuffer,
 /**
  * Return the partial of an engine's wave that is its strongest tone: a four-stroke engine repeats
  * every two turns, a motor with every pulse.
- *
  * @returns number of the partial
  */
 export function mainPartial(train: DriveTrain): number {
@@ -105,7 +95,6 @@ export function mainPartial(train: DriveTrain): number {
 
 /**
  * Make the wave of an engine: the strongest tone and its multiples, weaker ones between them.
- *
  * @param falling exponent with which the partials fall: less is harsher
  * @returns of amplitude 1
  */

@@ -1,18 +1,17 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The bare page of a driver: it takes its seat and reports to the framing page. */
+/** The bare page of a driver: it takes its seat, and talks with the page that frames it. */
 
 import { element, setAttribute, setText } from '../dom.js';
+import { languageOf, WORDS } from '../driver_words.js';
 import { keepProfiles } from '../driving/gamepad_profile.js';
-import { FrameLink } from './frame_link.js';
 import { readStage } from './stage_address.js';
-import { WORDS } from './stage_words.js';
 
 import type { Connection } from '../connection.js';
+import type { StageTrouble } from '../driver_words.js';
 import type { Store } from '../store.js';
 import type { StageAddress } from './stage_address.js';
 import type { StageOrder, StageState, StageView } from './stage_messages.js';
-import type { StageTrouble } from './stage_words.js';
 
 // Least interval of reports to the framing page [ms].
 const EVERY_MS = 100;
@@ -25,7 +24,7 @@ export class Stage {
   #store;
   #connection;
   #link;
-  #words;
+  #words = WORDS.en;
   #line = element('div', { class: 'stage-line', role: 'alert', hidden: true });
   #role = '';
   #claimed_ms = -Infinity;
@@ -43,10 +42,9 @@ export class Stage {
     this.address = address;
     this.#store = store;
     this.#connection = connection;
-    this.#words = WORDS[address.lang];
     this.#link = new FrameLink(store, (order) => this.#obey(order));
-    document.documentElement.lang = address.lang;
     root.append(this.#line);
+    this.#speak();
     document.addEventListener('contextmenu', (event) => event.preventDefault());
     store.on('notice', ({ level, text }) => {
       this.#failed = level === 'error' ? text : this.#failed;
@@ -57,8 +55,8 @@ export class Stage {
       this.#claimRole();
     });
     store.on('epoch', () => { this.#before = this.#begun ? this.#pictures : NaN; });
-    store.on('seats', () => this.#update());
-    store.on('connection', () => this.#update());
+    store.on('scene', () => this.#speak());
+    store.on(['seats', 'connection'], () => this.#update());
     this.#claimRole();
     setInterval(() => this.#update(), EVERY_MS);
   }
@@ -70,7 +68,7 @@ export class Stage {
     for (const [layer, on] of Object.entries({ labels: names, plans, goals: plans })) {
       world.setLayer(layer, on);
     }
-    this.#writeLabels();
+    this.#speak();
     window.crgame.sound?.want(sound);
     if (view3d !== undefined) {
       view3d.keys = change;
@@ -97,7 +95,11 @@ export class Stage {
     return view3d?.on ? view3d.stats?.frames ?? 0 : world.stats.frames;
   }
 
-  #writeLabels() {
+  /** Use the language of the address, or else of the game, once it is known. */
+  #speak() {
+    const language = languageOf(window.location.search, this.#store.scene?.language);
+    this.#words = WORDS[language];
+    document.documentElement.lang = language;
     for (const name of ['throttle', 'brake'] as const) {
       const label = document.querySelector(`.pedal-${name} .bar-label`);
       if (label !== null) {
@@ -158,9 +160,8 @@ export class Stage {
    * was taken over in the run before: its planner starts the next run.
    */
   #leave() {
-    const { seats, me, connected } = this.#store;
-    const left = Object.keys(seats).find((id) => me.id !== '' && seats[id].holder === me.id
-      && (id !== this.address.seat || this.#staysBehind));
+    const { own, connected } = this.#store;
+    const left = own.find((id) => id !== this.address.seat || this.#staysBehind);
     if (connected && left !== undefined && performance.now() - this.#left_ms > CLAIM_EVERY_MS) {
       this.#left_ms = performance.now();
       if (left === this.address.seat) {
@@ -290,7 +291,6 @@ export class Stage {
 
 /**
  * Make the page a stage.
- *
  * @throws {Error} if the address is not one of a stage
  */
 export function createStage(root: HTMLElement, store: Store, connection: Connection): Stage {
@@ -299,4 +299,45 @@ export function createStage(root: HTMLElement, store: Store, connection: Connect
     throw new Error('the address names no seat');
   }
   return new Stage(root, store, connection, address);
+}
+
+/** The sender and receiver of messages to the framing page. */
+class FrameLink {
+  #store;
+  #told = '';
+  #heard = '';
+
+  /** `store` whose `framedBy` has the origins; `ordered` called for each order of that page. */
+  constructor(store: Store, ordered: (order: StageOrder) => void) {
+    this.#store = store;
+    window.addEventListener('message', ({ source, origin, data }) => {
+      if (source === window.parent && window.parent !== window && origin !== ''
+          && store.framedBy.includes(origin) && isOrder(data)) {
+        this.#heard = origin;
+        ordered(data);
+      }
+    });
+  }
+
+  /** Send the state if it has changed. */
+  send(state: StageState) {
+    const { framedBy } = this.#store;
+    const text = JSON.stringify(state);
+    if (window.parent !== window && framedBy.length > 0 && text !== this.#told) {
+      this.#told = text;
+      // The browser gives it only to a page of the named origin.
+      for (const origin of this.#heard === '' ? framedBy : [this.#heard]) {
+        window.parent.postMessage({ crgame: 1, kind: 'stage', state }, origin);
+      }
+    }
+  }
+}
+
+function isOrder(data: unknown): data is StageOrder {
+  if (typeof data !== 'object' || data === null) {
+    return false;
+  }
+  const { crgame, kind, ready, profiles } = data as Record<string, unknown>;
+  return crgame === 1 && (kind === 'focus' || (kind === 'ready' && typeof ready === 'boolean')
+    || (kind === 'calibrations' && typeof profiles === 'object' && profiles !== null));
 }

@@ -8,7 +8,7 @@ import { FIELD_OF_VIEW } from '../view3d/field_of_view.js';
 import type { StageView } from './stage_messages.js';
 
 /** Corners of the view for a photodiode. */
-export const CORNERS = ['top-left', 'top-right', 'bottom-left', 'bottom-right'] as const;
+const CORNERS = ['top-left', 'top-right', 'bottom-left', 'bottom-right'] as const;
 
 export interface StageAddress {
   seat: string; // id of the vehicle that is driven
@@ -21,12 +21,10 @@ export interface StageAddress {
   change: boolean; // whether V and C change the view
   fieldOfView_deg: number | null; // across the picture; null for the browser's own [deg]
   corner: typeof CORNERS[number] | null; // that is white while a stimulus is shown
-  lang: 'en' | 'de'; // of the texts of the stage
 }
 
 /**
  * Read a page's address.
- *
  * @param query `?stage=hv0&view=driver&map=1&names=0&plans=0&sound=1&lang=en`
  * @returns null for the full page
  */
@@ -46,6 +44,5 @@ export function readStage(query: string): StageAddress | null {
     sound: flag('sound', true), mirrors: flag('mirrors', true), change: flag('change', false),
     fieldOfView_deg: angle >= FIELD_OF_VIEW.least && angle <= FIELD_OF_VIEW.most ? angle : null,
     corner: CORNERS.find((name) => name === values.get('corner')) ?? null,
-    lang: values.get('lang') === 'de' ? 'de' : 'en',
   };
 }

@@ -35,7 +35,6 @@ export interface StageState {
   trouble: string; // why the driver cannot drive, in English; empty for no trouble
 }
 
-export interface StageTells { crgame: 1; kind: 'stage'; state: StageState } // to the framing page
 export interface ReadyOrder { crgame: 1; kind: 'ready'; ready: boolean } // from it
 export interface FocusOrder { crgame: 1; kind: 'focus' } // from it
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The inputs by which a driver answers: a key and a button for each kind of task, touch. */
 
-import { isTyping } from '../driving/focus.js';
+import { isCommand } from '../driving/focus.js';
 import { connectedPads } from '../driving/gamepad.js';
 import { LIGHT_BUTTONS } from '../lights.js';
 
@@ -18,12 +18,7 @@ export type AnswerInputs = Partial<Record<Answered, AnswerInput>>;
 // An older time stamp of a gamepad does not belong to the press just seen [ms].
 const FRESH_MS = 200;
 
-/**
- * Return whether a button has another meaning.
- *
- * @param profile of its device
- * @param index of the button
- */
+/** Return whether a button has another meaning; `profile` of its device; `index` of the button. */
 export function isTaken(profile: Profile, index: number): boolean {
   const { reverse, lights, put_back } = profile;
   return [reverse.on, reverse.off, reverse.toggle, reverse.held,
@@ -35,7 +30,6 @@ export function isTaken(profile: Profile, index: number): boolean {
 /**
  * Return what a button answers. By default any free button answers a request, and any a light; a
  * driver who may get both answers lights by the first free one.
- *
  * @param profile of its device
  * @param index of the button
  * @returns null for nothing
@@ -108,12 +102,10 @@ export class Answers {
   }
 
   #key(event: KeyboardEvent) {
-    const free = !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping(event.target)
-      && !document.querySelector('dialog[open]');
     const inputs = this.#inputs();
     const what = (['light', 'request'] as const).find((each) => inputs[each]?.key === event.code
       || (inputs[each]?.key === 'Enter' && event.key === 'Enter'));
-    if (free && what !== undefined && this.#wanted(what)) {
+    if (isCommand(event) && what !== undefined && this.#wanted(what)) {
       event.preventDefault();
       event.stopPropagation();
       if (!event.repeat) {

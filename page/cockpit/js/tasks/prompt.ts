@@ -77,7 +77,6 @@ export class Prompt {
 
 /**
  * Apply a change just before a picture, and measure when that and the next one were drawn.
- *
  * @param change changes the picture
  * @returns when it was drawn, and the time from the beginning of this frame to that of the next
  */

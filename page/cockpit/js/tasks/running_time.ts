@@ -12,11 +12,7 @@ export class RunningTime {
     return !Number.isNaN(this.#since_ms);
   }
 
-  /**
-   * Record whether the run is running.
-   *
-   * @param now_ms from performance.now
-   */
+  /** Record whether the run is running; `now_ms` from performance.now. */
   note(runs: boolean, now_ms: number) {
     if (runs && this.stands) {
       this.#paused_ms += now_ms - this.#since_ms;
@@ -26,10 +22,7 @@ export class RunningTime {
     }
   }
 
-  /**
-   * @param now_ms from performance.now
-   * @returns total pause since the page was loaded [ms]
-   */
+  /** Return the total pause since the page was loaded [ms]; `now_ms` from performance.now. */
   paused(now_ms: number): number {
     return this.#paused_ms + (this.stands ? Math.max(now_ms - this.#since_ms, 0) : 0);
   }

@@ -2,10 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The experimenter's panel of tasks: the active ones, and a button for each. */
 
-import { element, setAttribute, setText } from '../dom.js';
-import { fixed, oneLine } from '../panels/format.js';
-import { icon } from '../panels/icons.js';
-import { reasonAgainst } from '../rights.js';
+import { element } from '../dom.js';
+import { fixed } from '../panels/format.js';
+import { TriggerCards } from '../panels/trigger_cards.js';
 
 import type { Connection } from '../connection.js';
 import type { Store } from '../store.js';
@@ -14,81 +13,33 @@ import type { GameTask } from './task_messages.js';
 const KINDS = { detection_response: 'Detection response', take_over: 'Take-over request',
   secondary_task: 'Secondary task' };
 
-/**
- * Create the panel; without tasks there is none.
- *
- * @param root #panel-events
- */
+/** Create the panel; without tasks there is none. */
 export function createTaskPanel(root: HTMLElement, store: Store, connection: Connection) {
-  const list = element('ul', { class: 'event-list' });
+  const cards = new TriggerCards<GameTask>(store, connection, {
+    deed: 'begin or end tasks',
+    items: () => store.scene?.tasks ?? [],
+    about: ({ kind, seat, lead_s }) => ({ tag: KINDS[kind], more: [element('p', { class: 'dim',
+      text: `For the driver of ${seat}${
+        kind === 'take_over' ? `, ${fixed(lead_s ?? NaN, 1)} s ahead` : ''}` })] }),
+    now: ({ name, kind }) => {
+      const asks = kind === 'take_over';
+      const lasts = store.tasks.running.includes(name);
+      const open = store.tasks.open.find((prompt) => prompt.task === name);
+      const text = asks ? 'Ask' : lasts ? 'End' : 'Begin';
+      return { text, name: text, icon: 'bolt', done: asks && open !== undefined,
+        state: open && asks ? (open.seen ? 'Is shown' : 'No page shows it')
+          : open ? `Stimulus ${open.number}` : lasts ? 'Goes on' : '' };
+    },
+  });
   const box = element('section', { class: 'task-panel', hidden: true },
-    element('h2', { text: 'Tasks' }), list);
+    element('h2', { text: 'Tasks' }), cards.list);
   root.append(box);
-  const cards = new Map<string, ReturnType<typeof makeCard>>();
-
-  const update = () => {
-    const can = store.mode === 'live' && store.connected && store.status?.run !== 'ended'
-      && store.rights.directs;
-    const reason = reasonAgainst(store, 'direct', 'begin or end tasks');
-    for (const card of cards.values()) {
-      card.update(store, can, reason);
-    }
-  };
+  const update = () => cards.update();
   const rebuild = () => {
-    cards.clear();
-    for (const task of store.scene?.tasks ?? []) {
-      cards.set(task.name, makeCard(task, () => press(task.name)));
-    }
-    list.replaceChildren(...[...cards.values()].map((card) => card.root));
-    box.hidden = cards.size === 0;
+    box.hidden = cards.rebuild() === 0;
     update();
   };
-  const press = async (name: string) => {
-    const reply = await connection.request({ type: 'trigger', event: name });
-    cards.get(name)?.refused(reply.ok ? '' : oneLine(reply.text));
-  };
-  let run = '';
   store.on('scene', rebuild);
-  store.on('tasks', update);
-  store.on('hello', update);
-  store.on('you', update);
-  store.on('connection', update);
-  store.on('status', (status) => {
-    if (status.run !== run) {
-      run = status.run;
-      update();
-    }
-  });
+  store.on(['tasks', 'hello', 'you', 'connection', 'run'], update);
   rebuild();
-}
-
-function makeCard(task: GameTask, press: () => void) {
-  const label = oneLine(task.label || task.name);
-  const button = element('button', { type: 'button', class: 'primary', on: { click: press } });
-  const state = element('p', { class: 'event-state' });
-  const error = element('p', { class: 'field-error', role: 'alert' });
-  const asks = task.kind === 'take_over';
-  const lead = asks ? `, ${fixed(task.lead_s ?? NaN, 1)} s ahead` : '';
-  return {
-    root: element('li', { class: 'card event', 'data-task': task.name },
-      element('div', { class: 'event-head' },
-        element('div', {}, element('h3', { text: label }),
-          element('span', { class: 'tag', text: KINDS[task.kind] })), button),
-      element('p', { class: 'dim', text: `For the driver of ${task.seat}${lead}` }), state, error),
-    refused: (text: string) => setText(error, text),
-    /** @param reason why it cannot be pressed, or empty */
-    update(store: Store, can: boolean, reason: string) {
-      const lasts = store.tasks.running.includes(task.name);
-      const open = store.tasks.open.find((prompt) => prompt.task === task.name);
-      button.disabled = !can || (asks && open !== undefined);
-      setAttribute(button, 'title', reason || null);
-      const text = asks ? 'Ask' : lasts ? 'End' : 'Begin';
-      if (button.textContent !== text) {
-        button.replaceChildren(icon('bolt'), text);
-        button.setAttribute('aria-label', `${text} ${label}`);
-      }
-      setText(state, open && asks ? (open.seen ? 'Is shown' : 'No page shows it')
-        : open ? `Stimulus ${open.number}` : lasts ? 'Goes on' : '');
-    },
-  };
 }

@@ -4,7 +4,7 @@
 
 import { element, setText, svg } from '../dom.js';
 
-import type { Words } from './task_words.js';
+import type { Words } from '../driver_words.js';
 
 // A steering wheel with two hands, 24 × 24.
 const WHEEL = 'M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18m0 2.2a6.8 6.8 0 0 1 6.7 5.6h-4.2a2.8 2.8 0 0 0'
@@ -59,7 +59,6 @@ export class TaskView {
 
   /**
    * Show a request, or none.
-   *
    * @param request `free`: the seat is free, so that it can be taken here
    */
   showRequest(request: { label: string; hint: string; free: boolean } | null) {

@@ -3,11 +3,10 @@
 /** The tasks of the driver at this page: their view, and answers timed by the page's clock. */
 
 import { attends } from '../attending.js';
+import { labelsOf, languageOf, WORDS } from '../driver_words.js';
 import { Answers, keyName } from './answers.js';
 import { inPicture, Prompt } from './prompt.js';
-import { RequestTone } from './request_tone.js';
 import { RunningTime } from './running_time.js';
-import { labelsOf, languageOf, wordsIn } from './task_words.js';
 import { TaskView } from './task_view.js';
 
 import type { Connection } from '../connection.js';
@@ -25,7 +24,7 @@ export class Tasks {
   #answers;
   /** The open prompts of this page, by task and number. */
   #prompts = new Map<string, Prompt>();
-  #words = wordsIn('en');
+  #words = WORDS.en;
   #labels = labelsOf(window.location.search);
   #frameRequested = false;
 
@@ -40,9 +39,7 @@ export class Tasks {
     this.#view.takeButton.addEventListener('click', () => this.#takeOver());
     store.on('scene', () => this.#begin());
     store.on('epoch', () => this.#forget());
-    store.on('tasks', () => this.#update());
-    store.on('seats', () => this.#update());
-    store.on('connection', () => this.#update());
+    store.on(['tasks', 'seats', 'connection'], () => this.#update());
     store.on('status', () => {
       this.#running.note(this.#runs, performance.now());
       this.#requestFrame();
@@ -113,15 +110,14 @@ export class Tasks {
    * drive.
    */
   #mayTake(seat: string) {
-    const { seats, me, rights } = this.#store;
-    const sits = Object.values(seats).some(({ holder }) => holder === me.id);
-    return !sits && rights.drives && me.id !== '' && seats[seat] !== undefined
+    const { own, seats, me, rights } = this.#store;
+    return own.length === 0 && rights.drives && me.id !== '' && seats[seat] !== undefined
       && !seats[seat].holder && (rights.seat === '' || rights.seat === seat);
   }
 
   #begin() {
     const language = languageOf(window.location.search, this.#store.scene?.language);
-    this.#words = wordsIn(language);
+    this.#words = WORDS[language];
     this.#view.speak(this.#words, language);
     this.#update();
   }
@@ -238,7 +234,6 @@ export class Tasks {
 
   /**
    * Draw the corner for a photodiode, if the address names one.
-   *
    * @param lit whether a stimulus is in the same picture
    */
   #drawCorner(lit: boolean) {
@@ -287,11 +282,74 @@ export class Tasks {
   }
 }
 
-/**
- * Show the tasks of the game to the driver at this page.
- *
- * @param root `#stage`
- */
-export function createTasks(root: HTMLElement, store: Store, connection: Connection): Tasks {
-  return new Tasks(root, store, connection);
+// Two beeps an octave above the engine's loudest tones, audible to older drivers too [Hz, s].
+const PITCHES = [880, 1320];
+const BEEP_S = 0.12;
+const APART_S = 0.18;
+const PAIR_S = 0.7;
+const PAIRS = 3;
+const RISE_S = 0.008;
+const LOUDEST = 0.4;
+
+/** The tone of a request; browsers allow it after a first gesture on the page. */
+class RequestTone {
+  #context: AudioContext | null = null;
+  #sounding: OscillatorNode[] = [];
+
+  constructor() {
+    const begin = () => {
+      this.#context ??= new AudioContext({ latencyHint: 'interactive' });
+      if (this.#sounding.length === 0) {
+        this.#context.suspend();
+      }
+      window.removeEventListener('keydown', begin, true);
+      window.removeEventListener('pointerdown', begin, true);
+    };
+    window.addEventListener('keydown', begin, true);
+    window.addEventListener('pointerdown', begin, true);
+  }
+
+  /** @param volume 0 to 1 */
+  play(volume: number) {
+    this.stop();
+    const context = this.#context;
+    if (context === null || volume <= 0) {
+      return;
+    }
+    context.resume();
+    const start = context.currentTime + 0.01;
+    for (let pair = 0; pair < PAIRS; pair += 1) {
+      PITCHES.forEach((pitch, i) => {
+        this.#beep(context, pitch, start + pair * PAIR_S + i * APART_S, volume * LOUDEST);
+      });
+    }
+  }
+
+  /** Stop the tone. */
+  stop() {
+    for (const each of this.#sounding) {
+      each.stop();
+    }
+    this.#sounding = [];
+  }
+
+  /** `pitch` [Hz]; `at`: time of the context [s]. */
+  #beep(context: AudioContext, pitch: number, at: number, gain: number) {
+    const tone = new OscillatorNode(context, { type: 'triangle', frequency: pitch });
+    const level = new GainNode(context, { gain: 0 });
+    level.gain.setValueAtTime(0, at);
+    level.gain.linearRampToValueAtTime(gain, at + RISE_S);
+    level.gain.setValueAtTime(gain, at + BEEP_S - RISE_S);
+    level.gain.linearRampToValueAtTime(0, at + BEEP_S);
+    tone.connect(level).connect(context.destination);
+    tone.start(at);
+    tone.stop(at + BEEP_S);
+    tone.addEventListener('ended', () => {
+      this.#sounding = this.#sounding.filter((each) => each !== tone);
+      if (this.#sounding.length === 0) {
+        context.suspend();
+      }
+    });
+    this.#sounding.push(tone);
+  }
 }

@@ -5,7 +5,6 @@
 import { MeshBuilder } from './bodies/mesh_builder.js';
 import { geometryOf } from './instances.js';
 
-import type { Mesh } from 'three';
 import type { SceneVehicle } from '../messages.js';
 import type { Point, Tint } from './bodies/mesh_builder.js';
 import type { Three } from './three.js';
@@ -16,11 +15,10 @@ const PILLAR_M = 0.05;
 
 /**
  * Make the inside of a vehicle, relative to its rear axle on the road.
- *
  * @param paint its colour
  * @returns seen from the driver's eye only
  */
-export function createCabin(three: Three, vehicle: SceneVehicle, paint: number): Mesh {
+export function createCabin(three: Three, vehicle: SceneVehicle, paint: number) {
   const mesh = new MeshBuilder();
   const { red, green, blue } = rgbOf(three, paint);
   addBonnet(mesh, vehicle, [red, green, blue]);
@@ -79,11 +77,7 @@ function addFrame(mesh: MeshBuilder,
   }
 }
 
-/**
- * A straight bar from one point to another.
- *
- * @param width [m]
- */
+/** A straight bar from one point to another; `width` [m]. */
 function bar(mesh: MeshBuilder, from: Point, to: Point, width: number) {
   const w = width / 2;
   const section = ([x, y, z]: Point): Point[] => [[x + w, y - w, z - w], [x + w, y + w, z - w],

@@ -1,8 +1,15 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The poses of the 3D view's cameras, in the map's coordinates. */
+/** The poses of the 3D view's cameras and of their vehicle, in the map's coordinates. */
 
-const DEGREE = Math.PI / 180;
+import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { DEGREE } from '../units.js';
+import { poseOf } from './traffic.js';
+
+import type { SceneVehicle } from '../messages.js';
+import type { Shown } from '../store.js';
+import type { HeightAt } from './traffic.js';
+
 const CHASE_BEHIND_M = 6.5;
 const CHASE_ABOVE_M = 3.4;
 const CHASE_PITCH = -12 * DEGREE;
@@ -37,7 +44,6 @@ export interface CameraPose extends Point {
 
 /**
  * Return a camera at a point of a vehicle.
- *
  * @param point ahead of the rear axle, to the left, above the road [m]
  * @param aside how far it looks to the left of straight ahead [rad]
  * @param pitch how far it looks upwards [rad]
@@ -56,12 +62,10 @@ export function mountedAt(stand: Stand, point: Point, aside = 0, pitch = 0): Cam
 
 /**
  * Return a camera behind and above a vehicle.
- *
- * @param ends of the vehicle ahead of its rear axle [m]
+ * @param rear end of the vehicle, ahead of its rear axle [m]
  * @param aside how far it looks to the left of straight ahead [rad]
  */
-export function chasing(stand: Stand, { rear }: { front: number; rear: number },
-  aside = 0): CameraPose {
+export function chasing(stand: Stand, rear: number, aside = 0): CameraPose {
   const level = { ...stand, slope: 0.5 * stand.slope };
   return mountedAt(level, { x: rear - CHASE_BEHIND_M, y: 0, z: CHASE_ABOVE_M }, aside,
     CHASE_PITCH);
@@ -71,4 +75,23 @@ export function chasing(stand: Stand, { rear }: { front: number; rear: number },
 export function above(stand: Stand): CameraPose {
   return mountedAt({ ...stand, slope: 0 }, { x: BIRD_AHEAD_M, y: 0, z: BIRD_ABOVE_M }, 0,
     -90 * DEGREE);
+}
+
+/**
+ * Return the pose of a vehicle's rear axle on the road, and the slope.
+ * @param index of the vehicle
+ * @returns null while it has no place
+ */
+export function standOf(shown: Shown, index: number, vehicle: SceneVehicle,
+  heightAt: HeightAt): Stand | null {
+  const row = index * VEHICLE_WIDTH;
+  const [x, y] = [shown.vehicles[row], shown.vehicles[row + 1]];
+  const yaw = shown.vehicles[row + VEHICLE.yaw];
+  if (!Number.isFinite(x + y + yaw)) {
+    return null;
+  }
+  const ahead = vehicle.rear_to_center;
+  const { z, slope } = poseOf(x + ahead * Math.cos(yaw), y + ahead * Math.sin(yaw), yaw,
+    0.35 * vehicle.shape.length, heightAt);
+  return { x, y, yaw, z: z - ahead * Math.sin(slope), slope };
 }

@@ -26,11 +26,7 @@ export interface Contents { eye: ViewEye; shown: ShownThing[] }
 const SMALLEST = 0.002;
 const DIGITS = 4;
 
-/**
- * Return what a camera sees, the nearest first.
- *
- * @param things in the scene's coordinates
- */
+/** Return what a camera sees, the nearest first; `things` in the scene's coordinates. */
 export function seenBy({ view, eye }: Sighting, things: readonly Named[]): ShownThing[] {
   return things.flatMap((thing): ShownThing[] => {
     const box = boxOf(view, thing);
@@ -39,11 +35,7 @@ export function seenBy({ view, eye }: Sighting, things: readonly Named[]): Shown
   }).sort((one, other) => (one[6] ?? 0) - (other[6] ?? 0));
 }
 
-/**
- * Return a mirror, and before it what is seen in it.
- *
- * @param size of the picture [CSS px]
- */
+/** Return a mirror, and before it what is seen in it; `size` of the picture [CSS px]. */
 export function mirrorOf(mirror: SeenMirror, things: readonly Named[],
   size: { width: number; height: number }): ShownThing[] {
   const { left, bottom, width, height } = mirror.rectangle;
@@ -59,11 +51,7 @@ export function mirrorOf(mirror: SeenMirror, things: readonly Named[],
   return [...seen, thingOf('mirror', id, glass, null)];
 }
 
-/**
- * Return an entry of the message, in its order and precision.
- *
- * @param mirror in which it is seen
- */
+/** Return an entry of the message, in its order and precision; `mirror` in which it is seen. */
 export function thingOf(kind: ShownThing[0], id: string, { left, top, right, bottom }: Box,
   distance_m: number | null, mirror: string | null = null): ShownThing {
   const share = (value: number) => rounded(Math.min(Math.max(value, 0), 1), DIGITS);
@@ -73,7 +61,6 @@ export function thingOf(kind: ShownThing[0], id: string, { left, top, right, bot
 
 /**
  * Return the eye of a camera that is not rolled, above the plane of the road under a vehicle.
- *
  * @param stand of the vehicle, in the map
  * @param point of the eye, in the map
  * @param forwards direction in which it looks, of length 1

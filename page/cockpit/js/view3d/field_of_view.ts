@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The field of view of a picture. */
 
-const DEGREE = Math.PI / 180;
+import { DEGREE } from '../units.js';
+
 /** Range of the angle across the picture [deg]. */
 export const FIELD_OF_VIEW = { least: 30, usual: 75, most: 140 };
 // At a larger angle, the roof over the driver's head would be nearer than the near plane.
@@ -17,7 +18,6 @@ export interface Seat { screen_width_m: number; eye_distance_m: number }
 
 /**
  * Return the vertical angle of a picture from its horizontal one.
- *
  * @param across [rad]
  * @param aspect width through height
  * @returns [rad], limited in both directions
@@ -28,7 +28,6 @@ export function heightAngle(across: number, aspect: number): number {
 
 /**
  * Return the angle under which the driver sees a picture that is centred in front.
- *
  * @param share of the screen's width that the picture covers
  * @returns across the picture [rad]
  */
@@ -38,7 +37,6 @@ export function trueAngle({ screen_width_m, eye_distance_m }: Seat, share: numbe
 
 /**
  * Choose the angle across a picture.
- *
  * @param seat null for the chosen angle
  * @param chosen_deg across the picture [deg]
  * @param width of the picture [CSS px]
@@ -56,7 +54,6 @@ export function acrossAngle(seat: Seat | null, chosen_deg: number, width: number
 
 /**
  * Read the entries about screen and seat.
- *
  * @param width of the screen [cm]
  * @param distance of the eyes from it [cm]
  * @returns null if they are not valid

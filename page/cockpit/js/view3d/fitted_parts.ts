@@ -95,10 +95,7 @@ export class FittedParts {
     this.#materials = [];
   }
 
-  /**
-   * @param slope upwards [rad]
-   * @returns that pitches a level body; the same object each time
-   */
+  /** Return what pitches a level body, the same object each time; `slope` upwards [rad]. */
   pitched(slope: number): Matrix4 {
     return this.#pitch.makeRotationY(-slope);
   }
@@ -125,10 +122,7 @@ export class FittedParts {
     }
   }
 
-  /**
-   * @param place of the vehicle's middle
-   * @param scale of the body
-   */
+  /** `place` of the vehicle's middle; `scale` of the body. */
   addLamps(place: Matrix4, { front, rear, size: [width, height] }: NonNullable<Body['lamps']>,
     [sx, sy, sz]: Scale, lit: Lit, own: boolean) {
     for (const side of [1, -1]) {
@@ -147,7 +141,6 @@ export class FittedParts {
 
   /**
    * Add the blue lights of a priority vehicle to its roof.
-   *
    * @param place of the vehicle's middle
    * @param scale of the body
    */
@@ -157,11 +150,7 @@ export class FittedParts {
     }
   }
 
-  /**
-   * @param place of the thing's middle
-   * @param length of its footprint [m]
-   * @param width [m]
-   */
+  /** `place` of the thing's middle; `length` of its footprint [m]; `width` [m]. */
   addShadow(place: Matrix4, length: number, width: number, own: boolean) {
     this.#matrix.copy(place)
       .multiply(this.#step.makeTranslation(0, 0, SHADOW_ABOVE_M))
@@ -169,10 +158,7 @@ export class FittedParts {
     this.#shadows?.add(this.#matrix, null, own);
   }
 
-  /**
-   * @param width [m]
-   * @param height [m]
-   */
+  /** `width` [m]; `height` [m]. */
   #addLamp(place: Matrix4, x: number, y: number, z: number, width: number, height: number,
     color: number, own: boolean) {
     this.#matrix.copy(place).multiply(this.#step.makeTranslation(x, y, z))

@@ -148,10 +148,7 @@ export class Headlights {
     this.#beams = [];
   }
 
-  /**
-   * @param turned [rad]
-   * @returns the same one each time
-   */
+  /** Return the same one each time; `turned` by [rad]. */
   #at(place: Matrix4, x: number, y: number, z: number, turned: number): Matrix4 {
     this.#matrix.copy(place).multiply(this.#step.makeTranslation(x, y, z));
     return turned === 0 ? this.#matrix

@@ -19,7 +19,6 @@ export class KeyAnswer {
 
   /**
    * Record that a driving key was pressed or released.
-   *
    * @param newest_t of the newest state that has come [s]
    * @param rate simulated seconds per second
    */
@@ -31,7 +30,6 @@ export class KeyAnswer {
 
   /**
    * Return whether a picture may show the answer.
-   *
    * @param t simulation time that it would show [s]
    * @returns false too once there have been enough
    */

@@ -14,8 +14,6 @@ export interface Origin { x: number; y: number } // in the map's coordinates [m]
 
 /**
  * Return the origin of a scene: always the same one for the same scene.
- *
- * @param scene the scene document
  * @returns whole metres, amid the map; local x = map x - origin x
  */
 export function localOrigin({ bounds: [xmin, ymin, xmax, ymax] }: Pick<Scene, 'bounds'>): Origin {

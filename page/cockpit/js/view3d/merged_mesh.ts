@@ -57,10 +57,7 @@ export class MergedMesh {
   #colors;
   #count = 0;
 
-  /**
-   * @param parts of one material
-   * @param most how many things there can be
-   */
+  /** `parts` of one material; `most`: how many things there can be. */
   constructor(three: Three, parts: Part[], most: number) {
     const corners = new Corners(parts);
     this.#corners = corners;
@@ -98,11 +95,7 @@ export class MergedMesh {
     this.#count = 0;
   }
 
-  /**
-   * @param m matrices
-   * @param tints colours
-   * @param which of them
-   */
+  /** `m`: matrices; `tints`: colours; `which` of them. */
   add(m: Float32Array, tints: Float32Array, which: number) {
     const { count, positions, normals, colors, tinted } = this.#corners;
     const [o, c] = [16 * which, 3 * which];

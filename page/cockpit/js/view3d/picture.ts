@@ -2,22 +2,20 @@
 // SPDX-License-Identifier: Apache-2.0
 /** One canvas on which three.js draws: the renderer, the world, the bodies and the cameras. */
 
-import { above, chasing, mountedAt } from './cameras.js';
+import { DEGREE, DEGREES } from '../units.js';
 import { createCabin } from './cabin.js';
+import { above, chasing, mountedAt, standOf } from './cameras.js';
 import { eyeOf, mirrorOf, seenBy } from './contents.js';
-import { FrameCost } from './frame_cost.js';
 import { localOrigin } from './local_origin.js';
 import { Mirrors } from './mirrors.js';
 import { PlanRibbons } from './plan_ribbons.js';
-import { isSoftware, Quality } from './quality.js';
+import { FrameCost, isSoftware, Quality } from './quality.js';
 import { createRoadWorld } from './road/road_world.js';
-import { roleColor } from './role_color.js';
 import { sightOf } from './seen_instances.js';
 import { product } from './solid_boxes.js';
 import { Traffic } from './traffic.js';
-import { standOf } from './vehicle_stand.js';
 
-import type { Mesh, PerspectiveCamera } from 'three';
+import type { PerspectiveCamera } from 'three';
 import type { Scene, SceneVehicle } from '../messages.js';
 import type { Shown, Store } from '../store.js';
 import type { CameraPose, Stand, Viewpoint } from './cameras.js';
@@ -59,15 +57,12 @@ export class Picture {
   #size = { width: 1, height: 1 };
   #road: RoadWorld | null = null;
   #document: Scene | null = null;
-  #cabin: { mesh: Mesh; vehicle: SceneVehicle } | null = null;
+  #cabin: { mesh: ReturnType<typeof createCabin>; vehicle: SceneVehicle } | null = null;
   #origin = { x: 0, y: 0 };
   #last: { stand: Stand; mirrors: boolean; inside: boolean } | null = null;
   store;
 
-  /**
-   * @param three the library
-   * @throws {Error} if the browser has no WebGL 2
-   */
+  /** @throws {Error} if the browser has no WebGL 2 */
   constructor(three: Three, canvas: HTMLCanvasElement, store: Store) {
     this.#three = three;
     const name = rendererName();
@@ -121,10 +116,7 @@ export class Picture {
     return this.#origin;
   }
 
-  /**
-   * @param width [CSS px]
-   * @param height [CSS px]
-   */
+  /** `width` [CSS px]; `height` [CSS px]. */
   resize(width: number, height: number) {
     this.#size = { width, height };
     const { ratio } = this.#quality;
@@ -136,7 +128,6 @@ export class Picture {
 
   /**
    * Draw one picture.
-   *
    * @param shown current rows
    * @param now_ms the animation frame's time
    * @returns false while nothing can be seen
@@ -156,7 +147,7 @@ export class Picture {
     this.#renderer.info.reset();
     this.#aimMain(stand, vehicle, looks);
     const eye = this.#camera.position;
-    road.update(this.store, now_ms, { x: eye.x, y: eye.y, z: eye.z });
+    road.update(this.store, { x: eye.x, y: eye.y, z: eye.z });
     this.#traffic.byRole = !inside;
     this.#traffic.update(shown, vehicle.id, road.heightAt, eye);
     this.#plans.update(looks.plans, shown, this.#origin, road.heightAt);
@@ -205,7 +196,7 @@ export class Picture {
     const forwards = this.#camera.getWorldDirection(new this.#three.Vector3());
     return {
       eye: eyeOf(stand, [x + this.#origin.x, y + this.#origin.y, z],
-        [forwards.x, forwards.y, forwards.z], fov * Math.PI / 180, aspect),
+        [forwards.x, forwards.y, forwards.z], fov * DEGREE, aspect),
       shown: [...glasses, ...seenBy(this.#sighting(this.#camera), things)],
     };
   }
@@ -219,9 +210,9 @@ export class Picture {
     const [x, y, z] = vehicle.driver_place.eye;
     const rear = vehicle.rear_to_center - 0.5 * vehicle.shape.length;
     const pose = viewpoint === 'driver' ? mountedAt(stand, { x, y, z }, aside)
-      : viewpoint === 'chase' ? chasing(stand, { rear, front: rear + vehicle.shape.length }, aside)
+      : viewpoint === 'chase' ? chasing(stand, rear, aside)
         : above(stand);
-    this.#camera.fov = height * 180 / Math.PI;
+    this.#camera.fov = height * DEGREES;
     this.#camera.aspect = this.#size.width / this.#size.height;
     this.#camera.updateProjectionMatrix();
     this.#aim(this.#camera, pose);
@@ -251,7 +242,6 @@ export class Picture {
 
   /**
    * Submit the things that a camera sees.
-   *
    * @param sooner share of the distance at which things are plain
    * @param own whether the own vehicle is drawn
    */
@@ -272,6 +262,7 @@ export class Picture {
     if (inside && this.#cabin?.vehicle !== vehicle) {
       this.#cabin?.mesh.removeFromParent();
       this.#cabin?.mesh.geometry.dispose();
+      this.#cabin?.mesh.material.dispose();
       const mesh = createCabin(this.#three, vehicle, this.#traffic.paintOf(vehicle.id));
       this.#scene.add(mesh);
       this.#cabin = { mesh, vehicle };
@@ -313,7 +304,7 @@ export class Picture {
     }
     this.#document = scene;
     this.#choose();
-    this.#traffic.load(scene, this.#origin, roleColor(this.#three));
+    this.#traffic.load(scene, this.#origin);
   }
 }
 

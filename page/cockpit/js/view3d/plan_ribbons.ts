@@ -4,6 +4,7 @@
 
 import { PLAN_WIDTH } from '../frames.js';
 import { themeColor } from '../world/palette.js';
+import { shownPlans } from '../world/plan_layer.js';
 
 import type { Group } from 'three';
 import type { PlanFrame } from '../frames.js';
@@ -41,7 +42,7 @@ export class PlanRibbons {
       return;
     }
     const positions: number[] = [];
-    for (const plan of this.#store.plans.values()) {
+    for (const plan of shownPlans(this.#store, shown)) {
       addRibbon(positions, plan, shown.t, origin, heightAt);
     }
     this.#mesh.visible = positions.length > 0;

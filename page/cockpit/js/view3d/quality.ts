@@ -47,11 +47,7 @@ const SLOWEST_MS = 50;
 /** Names of renderers that are the processor itself. */
 const SOFTWARE_NAMES = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
-/**
- * Return whether a renderer is the processor.
- *
- * @param name from WEBGL_debug_renderer_info
- */
+/** Return whether a renderer is the processor; `name` from WEBGL_debug_renderer_info. */
 export function isSoftware(name: string): boolean {
   return SOFTWARE_NAMES.test(name);
 }
@@ -98,7 +94,6 @@ export class Quality {
 
   /**
    * Record the cost of a picture.
-   *
    * @param cost_ms time until it was complete
    * @returns whether ratio or detail have changed
    */
@@ -121,5 +116,43 @@ export class Quality {
     }
     this.#changed_ms = now_ms;
     return true;
+  }
+}
+
+// Pictures between two measurements: waiting for the graphics card costs time, too.
+const EVERY = 15;
+
+/** A meter for some of the pictures of one context. */
+export class FrameCost {
+  #context;
+  #count = 0;
+  #begin_ms = 0;
+
+  constructor(context: WebGLRenderingContext | WebGL2RenderingContext) {
+    this.#context = context;
+  }
+
+  /** Begin a picture; return whether it is measured: then `end` is called. */
+  begin(): boolean {
+    this.#count += 1;
+    if (this.#count % EVERY !== 0) {
+      return false;
+    }
+    // Work submitted earlier does not belong to this picture.
+    this.#wait();
+    this.#begin_ms = performance.now();
+    return true;
+  }
+
+  /** @returns time of the picture [ms] */
+  end(): number {
+    this.#wait();
+    return performance.now() - this.#begin_ms;
+  }
+
+  /** Wait by reading a pixel, which completes all work; browsers do not wait at `finish`. */
+  #wait() {
+    const pixel = new Uint8Array(4);
+    this.#context.readPixels(0, 0, 1, 1, this.#context.RGBA, this.#context.UNSIGNED_BYTE, pixel);
   }
 }

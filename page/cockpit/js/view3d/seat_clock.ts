@@ -55,7 +55,6 @@ export class SeatClock {
 
   /**
    * Send the shown time to the followers.
-   *
    * @param now_ms the animation frame's time
    * @param t simulation time that is shown [s]
    */
@@ -73,7 +72,6 @@ export class SeatClock {
 
   /**
    * Show the leader's time before a frame, while there is a leader.
-   *
    * @param now_ms the animation frame's time
    */
   follow(now_ms: number) {

@@ -25,7 +25,6 @@ export interface Sight {
 
 /**
  * Return the sight of a camera.
- *
  * @param camera whose matrices are those of the picture
  * @param plain_m see Sight
  * @param own whether the own vehicle is drawn
@@ -41,11 +40,7 @@ export function sightOf(three: Three, camera: Camera, plain_m: number, own: bool
   return { planes, eye: camera.position, plain_m, own };
 }
 
-/**
- * @param planes see Sight
- * @param radius [m]
- * @returns whether a ball may be visible
- */
+/** Return whether a ball may be visible; `planes`: see Sight; `radius` [m]. */
 export function isWithin(planes: Float64Array, x: number, y: number, z: number,
   radius: number): boolean {
   for (let i = 0; i < 24; i += 4) {
@@ -73,7 +68,6 @@ export interface Shapes {
 
 /**
  * Return a shape as a plain one, for things whose number costs more than their triangles.
- *
  * @param part of a material without vertex colours
  * @returns whose material has to be freed, too
  */

@@ -30,7 +30,6 @@ export function product(a: Elements, b: Elements): number[] {
 
 /**
  * Return the box around the picture of a solid; what is behind the eye does not count.
- *
  * @param view projection after the change to the camera's coordinates
  * @returns within 0 to 1; null where nothing of it is in the picture
  */
@@ -79,11 +78,7 @@ export function distanceTo({ matrix, low, high }: Solid, point: Triple): number 
   return Math.sqrt(squares);
 }
 
-/**
- * Return a solid that stands upright.
- *
- * @param yaw heading of its x axis [rad]
- */
+/** Return a solid that stands upright; `yaw`: heading of its x axis [rad]. */
 export function upright(x: number, y: number, yaw: number, low: Triple, high: Triple): Solid {
   const [c, s] = [Math.cos(yaw), Math.sin(yaw)];
   return { matrix: [c, s, 0, 0, -s, c, 0, 0, 0, 0, 1, 0, x, y, 0, 1], low, high };

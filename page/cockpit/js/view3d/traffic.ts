@@ -5,23 +5,23 @@
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { shining } from '../lights.js';
 import { BrakeLights } from '../world/brake_lights.js';
+import { colorNameOf, themeColor } from '../world/palette.js';
 import { ofObject, ofVehicle } from './bodies/appearance.js';
 import { plainBody } from './bodies/plain_bodies.js';
 import { FittedParts } from './fitted_parts.js';
 import { Headlights } from './headlights.js';
 import { Instances } from './instances.js';
-import { steeringOf } from './steering.js';
 
 import type { Group } from 'three';
 import type { Scene, SceneObject } from '../messages.js';
 import type { Shown, Store } from '../store.js';
 import type { Appearance } from './bodies/appearance.js';
 import type { Body } from './bodies/motor_vehicles.js';
-import type { Origin } from './local_origin.js';
-import type { Three } from './three.js';
 import type { Named } from './contents.js';
+import type { Origin } from './local_origin.js';
 import type { Sight } from './seen_instances.js';
 import type { Triple } from './solid_boxes.js';
+import type { Three } from './three.js';
 
 export interface Thing {
   id: string;
@@ -82,11 +82,8 @@ export class Traffic {
     store.on('objects', (step) => this.#brakeLights.update(step));
   }
 
-  /**
-   * @param origin of the coordinates in the group
-   * @param colorOf returns its colour on the map
-   */
-  load(scene: Scene, origin: Origin, colorOf: (role: string, type: string) => number) {
+  /** @param origin of the coordinates in the group */
+  load(scene: Scene, origin: Origin) {
     this.#clear();
     this.#scene = scene;
     this.#origin = origin;
@@ -103,12 +100,12 @@ export class Traffic {
       this.#instances.set(key, new Instances(this.#three, this.#group, body.mesh, count,
         plainBody(look.key, body)));
     }
-    const things = looks.map((look, i) => {
-      const vehicle = scene.vehicles[i];
-      const object = scene.objects[i - scene.vehicles.length];
-      return this.#thing(look, bodies.get(look.key) as Body,
-        vehicle?.id ?? object.id, vehicle ? colorOf(vehicle.role, vehicle.type)
-          : colorOf(object.role, object.type));
+    const colors = new Map<string, number>();
+    const things = [...scene.vehicles, ...scene.objects].map((thing, i) => {
+      const name = colorNameOf(thing);
+      const color = colors.get(name) ?? new this.#three.Color(themeColor(name)).getHex();
+      colors.set(name, color);
+      return this.#thing(looks[i], bodies.get(looks[i].key) as Body, thing.id, color);
     });
     this.#vehicles = things.slice(0, scene.vehicles.length);
     this.#objects = things.slice(scene.vehicles.length);
@@ -123,7 +120,6 @@ export class Traffic {
 
   /**
    * Place all bodies at their current poses.
-   *
    * @param own id of the vehicle in which the camera may be
    * @param eye of the camera, in the group's coordinates
    */
@@ -172,10 +168,7 @@ export class Traffic {
     this.#headlights.see(sight);
   }
 
-  /**
-   * @param id of a driven vehicle
-   * @returns its colour, which does not depend on its driver
-   */
+  /** Return a driven vehicle's colour, which does not depend on its driver. */
   paintOf(id: string): number {
     return this.#vehicles.find((thing) => thing.id === id)?.look.paint ?? 0;
   }
@@ -257,7 +250,6 @@ function kindOf(type: string, { wheels, lamps }: Body): PlacedBody['kind'] {
 
 /**
  * Return the height of the road midway between two points along the heading, and the slope.
- *
  * @param x [m]
  * @param y [m]
  * @param yaw [rad]
@@ -271,4 +263,25 @@ export function poseOf(x: number, y: number, yaw: number, reach: number,
   const front = heightAt(x + dx, y + dy);
   const rear = heightAt(x - dx, y - dy);
   return { z: 0.5 * (front + rear), slope: Math.atan2(front - rear, 2 * reach) };
+}
+
+// Largest steering angle of cars [rad].
+const MOST = 0.65;
+// Below this speed, the quotient is unreliable: the wheels straighten up to standstill [m/s].
+const SLOW = 1;
+
+/**
+ * Return the steering angle of a single-track model with this motion:
+ * tan(angle) = wheelbase * yaw rate / speed.
+ * @param wheelbase [m]
+ * @param speed along its heading, below 0 backwards [m/s]
+ * @param yaw_rate [rad/s]
+ * @returns [rad], positive to the left; 0 at standstill
+ */
+export function steeringOf(wheelbase: number, speed: number, yaw_rate: number): number {
+  if (Math.abs(speed) < Number.EPSILON) {
+    return 0;
+  }
+  const angle = Math.atan(wheelbase * yaw_rate / speed);
+  return Math.min(Math.max(angle, -MOST), MOST) * Math.min(Math.abs(speed) / SLOW, 1) ** 2;
 }

@@ -3,13 +3,12 @@
 /** The 3D view beside the map: the choice of the two, the viewpoint and the times of drawing. */
 
 import { element } from '../dom.js';
-import { isTyping } from '../driving/focus.js';
+import { isCommand, isTyping } from '../driving/focus.js';
 import { VIEWPOINTS } from './cameras.js';
 import { acrossAngle, heightAngle } from './field_of_view.js';
 import { KeyAnswer } from './key_answer.js';
 import { SeatClock } from './seat_clock.js';
-import { createViewButtons } from './view_buttons.js';
-import { ViewSettings } from './view_settings.js';
+import { createViewButtons, ViewSettings } from './view_settings.js';
 import { ViewTeller } from './view_teller.js';
 import { readViewWindow } from './view_window.js';
 
@@ -68,9 +67,9 @@ export class View3d {
       window.addEventListener(name, (event) => this.#awaitAnswer(event), true);
     }
     new ResizeObserver(() => this.#resize()).observe(stage);
-    for (const name of ['scene', 'epoch', 'plan', 'state', 'signals'] as const) {
-      store.on(name, () => { this.#due = PICTURES_AFTER_CHANGE; });
-    }
+    store.on(['scene', 'epoch', 'plan', 'state', 'signals', 'events'], () => {
+      this.#due = PICTURES_AFTER_CHANGE;
+    });
     if (this.window !== null) {
       document.documentElement.classList.add('view-window');
       this.show(true);
@@ -106,11 +105,7 @@ export class View3d {
       ?? vehicles[0]?.id ?? null;
   }
 
-  /**
-   * Show the 3D view or the map.
-   *
-   * @returns whether it is shown: it needs three.js and WebGL 2
-   */
+  /** Show the 3D view or the map; return whether it is shown: it needs three.js and WebGL 2. */
   async show(on: boolean): Promise<boolean> {
     this.#on = on && await this.#load();
     this.#canvas.hidden = !this.#on;
@@ -130,7 +125,6 @@ export class View3d {
 
   /**
    * Draw once more and return it as PNG, because the browser discards the drawing after a frame.
-   *
    * @returns null while nothing can be seen
    */
   async snapshot(): Promise<Blob | null> {
@@ -185,8 +179,7 @@ export class View3d {
   }
 
   #pressed(event: KeyboardEvent) {
-    if (!this.keys || event.ctrlKey || event.metaKey || event.altKey || event.repeat
-        || isTyping(event.target)) {
+    if (!this.keys || event.repeat || !isCommand(event)) {
       return;
     }
     const key = event.key.toLowerCase();
@@ -272,14 +265,4 @@ export class View3d {
       }
     }
   }
-}
-
-/**
- * Put the 3D view beside the map.
- *
- * @param root the stage, which holds the map
- * @param store what is shown
- */
-export function createView3d(root: HTMLElement, store: Store, connection: Connection): View3d {
-  return new View3d(root, store, connection);
 }

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Windows with only a view: side and rear screens of one seat. */
 
+import { DEGREE } from '../units.js';
 import { VIEWPOINTS } from './cameras.js';
 import { FIELD_OF_VIEW } from './field_of_view.js';
 
 import type { Viewpoint } from './cameras.js';
 
-const DEGREE = Math.PI / 180;
 
 /** The settings of a window. */
 export interface ViewWindow {
@@ -19,7 +19,6 @@ export interface ViewWindow {
 
 /**
  * Read a page's address.
- *
  * @param query `?view=driver&yaw=-60`, degrees to the left; `vehicle` and `fov` besides
  * @returns null for a page with map and panels
  */

@@ -3,9 +3,10 @@
 /** The content of the map in words, for users who cannot see it and for tests. */
 
 import { element, setText } from '../dom.js';
-import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
+import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { icon } from '../panels/icons.js';
 import { recall, remember } from '../panels/memory.js';
+import { KMH } from '../units.js';
 import { driverSight } from './driver_sight.js';
 
 import type { Shown, Store } from '../store.js';
@@ -14,8 +15,6 @@ const EVERY_MS = 1000;
 // Objects farther away are left out [m].
 const REACH = 100;
 const MOST_TOLD = 5;
-const KMH = 3.6;
-const OBJECT_WIDTH = 6;
 const STANDING = 0.3;
 
 // [m, rad, m/s]
@@ -23,7 +22,6 @@ export interface Body { id: string; x: number; y: number; yaw: number; speed: nu
 
 /**
  * Describe the objects around a vehicle, the nearest first.
- *
  * @param driven whether this page drives it
  * @param range visibility [m]
  */
@@ -55,11 +53,7 @@ function directionOf(own: Body, other: Body) {
     'ahead right'][eighth];
 }
 
-/**
- * Keep the text up to date, once a second at most; it is read out only on request.
- *
- * @param root #around
- */
+/** Keep the text up to date, once a second at most; it is read out only on request. */
 export function createAround(root: HTMLElement, store: Store): { describe: () => string } {
   const describe = () => {
     const seat = window.crgame.driving?.seat ?? null;

@@ -20,11 +20,7 @@ export interface Boundary {
   inner: boolean; // between two lanelets
 }
 
-/**
- * Collect the boundaries of a scene.
- *
- * @param lanelets of the scene document
- */
+/** Collect the boundaries of a scene; `lanelets` of the scene document. */
 export function collectBoundaries(lanelets: Lanelet[]): Boundary[] {
   const index = new Map(lanelets.map((lanelet, i) => [lanelet.id, i]));
   const drawn = new Map<string, Boundary>();

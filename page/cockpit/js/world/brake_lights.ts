@@ -22,11 +22,7 @@ export class BrakeLights {
     this.#lastStep = null;
   }
 
-  /**
-   * Update from a scenario step which objects slow down.
-   *
-   * @param step as received by the store
-   */
+  /** Update from a scenario step which objects slow down; `step` as received by the store. */
   update(step: Pick<ObjectsFrame, 'k' | 't' | 'objects'>) {
     const last = this.#lastStep;
     this.#lastStep = step;
@@ -40,10 +36,7 @@ export class BrakeLights {
     }
   }
 
-  /**
-   * @param index of an object
-   * @returns whether its brake lights are on
-   */
+  /** Return whether an object's brake lights are on. */
   ofObject(index: number): boolean {
     return this.#objects[index] === 1;
   }

@@ -80,11 +80,7 @@ export class Camera {
     this.#apply();
   }
 
-  /**
-   * Move on towards the target.
-   *
-   * @param now_ms the animation frame's time
-   */
+  /** Move on towards the target; `now_ms`: the animation frame's time. */
   update(now_ms: number) {
     const elapsed_ms = Math.max(now_ms - (this.#updated_ms || now_ms), 0);
     this.#updated_ms = now_ms;
@@ -116,7 +112,6 @@ export class Camera {
 
   /**
    * Start following a vehicle; call `track` in each frame from then on.
-   *
    * @param pose where it is
    * @param headingUp whether the map turns with it
    * @param zoomed choose the scale anew
@@ -225,8 +220,6 @@ export class Camera {
       ratio * this.toX(x, y), ratio * (this.toY(x, y) + down));
   }
 
-  /**
-   */
   #driverScale(speed = 0) {
     return Math.max(this.#free / (FOLLOW_HEIGHT + FOLLOW_TIME * speed), 2);
   }

@@ -10,7 +10,6 @@ export interface Sight { id: string; range: number } // from a vehicle, limited 
 
 /**
  * Return the seat from which this page's person looks.
- *
  * @param store its scene has the visibility
  * @returns null without a seat, which sees all: directors, spectators
  */
@@ -23,7 +22,6 @@ export function driverSight({ scene }: Store): Sight | null {
 
 /**
  * Remove the objects that are too far away to be visible.
- *
  * @param shown x of invisible objects becomes NaN
  * @param own index of the own vehicle; without one, nothing is done
  * @param range [m]

@@ -18,11 +18,7 @@ export interface Actions {
 export interface Place { x: number; y: number } // on the canvas [px]
 export interface Hand extends Place { moved: number }
 
-/**
- * Make pointers move a camera.
- *
- * @param canvas receives the pointers
- */
+/** Make pointers move a camera; `canvas` receives the pointers. */
 export function attachGestures(canvas: HTMLCanvasElement, actions: Actions) {
   const hands = new Map<number, Hand>();
   let turning = false;
@@ -86,10 +82,7 @@ export function attachGestures(canvas: HTMLCanvasElement, actions: Actions) {
   }, { passive: false });
 }
 
-/**
- * @param before of the moving pointer
- * @param other of the resting pointer
- */
+/** `before` of the moving pointer; `other` of the resting pointer. */
 function pinch(before: Place, other: Place, now: Place, actions: Actions) {
   const x = (now.x + other.x) / 2;
   const y = (now.y + other.y) / 2;

@@ -2,18 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Keys of the world; the driving keys (W A S D, arrows, space, R) are not among them. */
 
-import { isTyping } from '../driving/focus.js';
+import { isCommand } from '../driving/focus.js';
 
 import type { WorldActions } from './toolbar.js';
 
 const ZOOM_STEP = 1.25;
 const TURN_STEP = Math.PI / 12;
 
-/**
- * Make keys move the camera.
- *
- * @returns ends it
- */
+/** Make keys move the camera; return a function that ends it. */
 export function attachKeys(actions: WorldActions): () => void {
   const bindings: Record<string, (() => void) | undefined> = {
     '+': () => actions.zoomBy(ZOOM_STEP),
@@ -27,7 +23,7 @@ export function attachKeys(actions: WorldActions): () => void {
     l: () => actions.toggleLabels(),
   };
   const pressed = (event: KeyboardEvent) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) {
+    if (!isCommand(event)) {
       return;
     }
     const action = bindings[event.key.toLowerCase()];

@@ -55,8 +55,8 @@ export class LabelLayer {
       const vehicle = layer.vehicles[i];
       const row = i * VEHICLE_WIDTH;
       const yaw = shown.vehicles[row + VEHICLE.yaw];
-      const mine = store.me.id !== '' && store.seats[vehicle.id]?.holder === store.me.id;
-      this.#draw(context, view, mine ? `${vehicle.id} · you` : vehicle.id, vehicle,
+      const name = store.holds(vehicle.id) ? `${vehicle.id} · you` : vehicle.id;
+      this.#draw(context, view, name, vehicle,
         shown.vehicles[row] + vehicle.rear_to_center * Math.cos(yaw),
         shown.vehicles[row + 1] + vehicle.rear_to_center * Math.sin(yaw));
     }

@@ -38,11 +38,7 @@ export interface Chunk extends Paths {
   surfaces: Map<Surface, Path2D>;
 }
 
-/**
- * Build the paths of a scene, each chunk relative to its own point, so that float32 suffices.
- *
- * @param scene the scene document
- */
+/** Build the paths of a scene, each chunk relative to its own point, so that float32 suffices. */
 export function buildChunks(scene: Pick<Scene, 'lanelets'>): Chunk[] {
   const chunks = new Map<string, Chunk>();
   const homes = scene.lanelets.map((lanelet) => {
@@ -100,7 +96,6 @@ function addSurface(chunk: Chunk, lanelet: Lanelet, outline: number[]) {
 
 /**
  * Return the stripes of a crossing, along the traffic and across the path of pedestrians.
- *
  * @returns flat polygons
  */
 export function zebraStripes(lanelet: Pick<Lanelet, 'left' | 'right'>): number[][] {

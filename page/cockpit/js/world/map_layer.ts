@@ -34,12 +34,9 @@ export class MapLayer {
   #stops: Local[] = [];
   #goals: Local[] = [];
 
-  /** Whether the lanes' direction arrows are shown. */
-  arrows = true;
   /** Whether the AVs' goals are shown. */
   goals = true;
 
-  /** @param scene the scene document */
   load(scene: Scene) {
     this.#chunks = buildChunks(scene);
     this.#stops = scene.stop_lines.map(({ points }) => local(points, addLine));
@@ -138,7 +135,7 @@ export class MapLayer {
       this.#strokeAll(context, view, 'broad', palette.mark, marks);
       this.#fillAll(context, view, 'zebras', palette.mark, marks);
     }
-    const arrows = this.arrows ? faded(camera.scale, ARROWS) : 0;
+    const arrows = faded(camera.scale, ARROWS);
     if (arrows > 0) {
       this.#fillAll(context, view, 'arrows', palette.arrow, arrows);
     }
@@ -212,7 +209,6 @@ function faded(scale: number, [from, to]: number[]) {
 
 /**
  * Round a length up to 1, 2 or 5 times a power of ten.
- *
  * @param length any positive length
  * @returns the rounded one
  */

@@ -7,6 +7,8 @@
  * distinguishes motorways, country roads and roads in towns.
  */
 
+import { KMH } from '../units.js';
+
 import type { Lanelet } from '../messages.js';
 import type { Boundary } from './boundaries.js';
 
@@ -32,8 +34,8 @@ const SEAM_M = 0.08;
 const DOUBLE_LINE_M = 0.13;
 const MOTORWAY_TYPES = ['interstate', 'highway', 'mainCarriageWay', 'accessRamp', 'exitRamp'];
 // From 95 and 65 km/h on, half-way between two limits [m/s].
-const MOTORWAY_MPS = 95 / 3.6;
-const COUNTRY_MPS = 65 / 3.6;
+const MOTORWAY_MPS = 95 / KMH;
+const COUNTRY_MPS = 65 / KMH;
 
 /** Return the class of a lanelet's road, from its types and its speed limit. */
 export function roadClass(
@@ -48,11 +50,7 @@ export function roadClass(
   return speed_limit > MOTORWAY_MPS ? 'motorway' : speed_limit > COUNTRY_MPS ? 'country' : 'town';
 }
 
-/**
- * Return the strokes or kerb along a boundary.
- *
- * @param lanelet whose boundary it is
- */
+/** Return the strokes or kerb along a boundary; `lanelet` whose boundary it is. */
 export function strokesOf({ marking, inner }: Pick<Boundary, 'marking' | 'inner'>,
   lanelet: Lanelet): Stroke[] {
   const layout = LAYOUTS[roadClass(lanelet)];

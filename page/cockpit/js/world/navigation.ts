@@ -19,10 +19,7 @@ export class Navigation {
   #sceneId: string | null = null;
   #changed;
 
-  /**
-   * @param camera that is moved
-   * @param changed called after each requested move
-   */
+  /** `camera` that is moved; `changed` called after each requested move. */
   constructor(camera: Camera, changed: () => void) {
     this.#camera = camera;
     this.#changed = changed;
@@ -35,8 +32,6 @@ export class Navigation {
 
   /**
    * Load a scene; the view stays as it is if the map is the same as before.
-   *
-   * @param scene the scene document
    * @param follow begin with the first vehicle instead of the whole map
    */
   load(scene: Scene, follow: boolean) {
@@ -135,7 +130,6 @@ export class Navigation {
 
   /**
    * Keep up with the followed vehicle.
-   *
    * @param pose {x, y, yaw, speed} as shown, null while absent
    * @param animated move gradually to it at first
    */

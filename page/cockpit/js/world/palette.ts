@@ -10,9 +10,15 @@ const NAMES = [
   'map-label-ground', 'map-overlay', 'map-ray', 'map-estimate', 'map-occupied',
 ] as const;
 
+/** Return the name of a vehicle's or object's colour: that of its driver, else of its kind. */
+export function colorNameOf({ role, type }: { role: string; type: string }): ColorName {
+  return role === 'human' ? role : role === 'autonomous' ? 'av'
+    : type === 'pedestrian' || type === 'bicycle' ? 'vulnerable'
+      : role === 'traffic' || role === 'scripted' || role === 'static' ? role : 'recorded';
+}
+
 /**
  * Resolve a custom property to a colour for canvas and plots.
- *
  * @param name without the leading dashes
  * @returns a CSS colour without variables
  */
@@ -29,7 +35,6 @@ export function themeColor(name: string): string {
 
 /**
  * Call a function at each change of the system's theme or of data-theme on <html>.
- *
  * @param changed called after the new colours are in force
  */
 export function onThemeChange(changed: () => void) {

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The AVs' plans: a line with dots that fade with time, and the swept width. */
+/** The AVs' plans: a line with dots that fade with time, and the swept width; predictions. */
 
 import { PLAN_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 
 import type { PlanFrame } from '../frames.js';
-import type { FiredEvent, Scene } from '../messages.js';
-import type { LiveView } from './painter.js';
-import type { DrawnVehicle } from './vehicle_layer.js';
+import type { Shown, Store } from '../store.js';
+import type { LiveView, View } from './painter.js';
+import type { DrawnVehicle, Thing, VehicleLayer } from './vehicle_layer.js';
 
 // Dots are at multiples of this simulation time, so they stay in place if a new plan equals the
 // one before [s].
@@ -17,52 +17,30 @@ const DOT_PX = [1.8, 5];
 const BAND_ALPHA = 0.22;
 const FADED = 0.2;
 
-/** Plans of all AVs that are not hidden. */
-export class PlanLayer {
-  #hidden = new Set<string>();
-
-  /** Whether plans are shown at all. */
-  on = true;
-
-  /**
-   * Update which AVs' plans are hidden, from the fired events.
-   *
-   * @param scene with the definitions of the events
-   * @param fired in order
-   */
-  applyEvents(scene: Scene | null, fired: FiredEvent[]) {
-    this.#hidden.clear();
-    for (const { name } of fired) {
-      const event = scene?.events.find((entry) => entry.name === name);
-      if (event?.kind === 'plan_display') {
-        if (event.show) {
-          this.#hidden.delete(event.av);
-        } else {
-          this.#hidden.add(event.av);
-        }
-      }
+/** Return the plans of the AVs that are present, without those that an event has hidden. */
+export function shownPlans({ scene, fired, plans }: Store, shown: Shown): PlanFrame[] {
+  const hidden = new Set<string>();
+  for (const { name } of fired) {
+    const event = scene?.events.find((entry) => entry.name === name);
+    if (event?.kind === 'plan_display') {
+      hidden[event.show ? 'delete' : 'add'](event.av);
     }
   }
+  return [...plans.values()].filter(({ index }) => {
+    const av = scene?.vehicles[index];
+    return av !== undefined && !hidden.has(av.id)
+      && Number.isFinite(shown.vehicles[index * VEHICLE_WIDTH]);
+  });
+}
 
-  /**
-   * @param id of an AV
-   * @returns whether its plan is shown
-   */
-  shows(id: string): boolean {
-    return this.on && !this.#hidden.has(id);
-  }
+/** The layer of plans. */
+export class PlanLayer {
+  on = true;
 
   /** Draw the future part of each plan. */
   draw(context: CanvasRenderingContext2D, view: LiveView, vehicles: DrawnVehicle[]) {
-    if (!this.on) {
-      return;
-    }
-    for (const plan of view.store.plans.values()) {
-      const vehicle = vehicles[plan.index];
-      if (vehicle !== undefined && this.shows(vehicle.id)
-          && Number.isFinite(view.shown.vehicles[plan.index * VEHICLE_WIDTH])) {
-        this.#drawPlan(context, view, plan, vehicle);
-      }
+    for (const plan of this.on ? shownPlans(view.store, view.shown) : []) {
+      this.#drawPlan(context, view, plan, vehicles[plan.index]);
     }
   }
 
@@ -146,4 +124,62 @@ function drawDots(context: CanvasRenderingContext2D, { camera, shown }: LiveView
       context.fill();
     }
   }
+}
+
+const STRIDE = 3;
+const LINE_ALPHA = 0.65;
+const END_ALPHA = 0.8;
+
+/** The layer of predictions in the AVs' requests; off by default. */
+export class PredictionLayer {
+  /** Whether predictions are shown. */
+  on = false;
+
+  /** Draw the future part of each prediction. */
+  draw(context: CanvasRenderingContext2D, view: LiveView, layer: VehicleLayer) {
+    if (!this.on) {
+      return;
+    }
+    for (const prediction of view.store.predictions.values()) {
+      const dt_c = view.scene.time.dt_c_s;
+      const passed = Math.max(Math.ceil((view.shown.t - prediction.t) / dt_c), 0);
+      if (passed < prediction.steps) {
+        for (const { column, points } of prediction.entries) {
+          const thing = column < layer.vehicles.length ? layer.vehicles[column]
+            : layer.objects[column - layer.vehicles.length];
+          if (thing !== undefined && layer.poseOf(thing.id, view.shown) !== null) {
+            drawEntry(context, view, thing, points, passed * STRIDE);
+          }
+        }
+      }
+    }
+    context.globalAlpha = 1;
+  }
+}
+
+function drawEntry(context: CanvasRenderingContext2D, { camera, ratio, palette }: View,
+  thing: Thing, points: Float64Array, first: number) {
+  const last = points.length - STRIDE;
+  const x = points[first];
+  const y = points[first + 1];
+  const length = Math.hypot(points[last] - x, points[last + 1] - y);
+  if (!(length > 0.5) || !camera.sees(x, y, length + thing.look.radius)) {
+    return;
+  }
+  camera.enterMap(context, ratio, x, y);
+  context.strokeStyle = palette[thing.color];
+  context.globalAlpha = LINE_ALPHA;
+  context.lineWidth = Math.max(0.12, 1.6 / camera.scale);
+  context.beginPath();
+  context.moveTo(0, 0);
+  for (let i = first + STRIDE; i <= last; i += STRIDE) {
+    context.lineTo(points[i] - x, points[i + 1] - y);
+  }
+  context.stroke();
+  const ahead = thing.rear_to_center ?? 0;
+  camera.enterPose(context, ratio, points[last] + ahead * Math.cos(points[last + 2]),
+    points[last + 1] + ahead * Math.sin(points[last + 2]), points[last + 2]);
+  context.globalAlpha = END_ALPHA;
+  context.lineWidth = 1.3 / camera.scale;
+  context.stroke(thing.look.body);
 }

@@ -4,10 +4,7 @@
 
 export type Lines = Pick<Path2D, 'moveTo' | 'lineTo'>; // receiver of lines
 
-/**
- * @param line flat polyline
- * @returns its length [m]
- */
+/** Return the length of a flat polyline [m]. */
 export function lengthOf(line: number[]): number {
   let length = 0;
   for (let i = 2; i < line.length; i += 2) {
@@ -18,7 +15,6 @@ export function lengthOf(line: number[]): number {
 
 /**
  * Find the pose at a distance along a polyline.
- *
  * @param line flat polyline
  * @param distance from its start [m]
  * @returns on the line; beyond its end, the end
@@ -41,7 +37,6 @@ export function poseAlong(line: number[],
 
 /**
  * Shift a polyline sideways.
- *
  * @param line flat polyline
  * @param offset to the left [m]
  * @returns flat polyline with as many points
@@ -63,7 +58,6 @@ export function shifted(line: number[], offset: number): number[] {
 
 /**
  * Add a whole polyline to a path.
- *
  * @param path receives it
  * @param line flat polyline
  * @param ox subtracted from x [m]
@@ -78,7 +72,6 @@ export function addLine(path: Lines, line: number[], ox: number, oy: number) {
 
 /**
  * Add the dashes of a polyline to a path, each by itself: cheaper than dashing at every frame.
- *
  * @param path receives them
  * @param line flat polyline
  * @param ox subtracted from x [m]
@@ -117,7 +110,6 @@ export function addDashes(path: Lines, line: number[], ox: number, oy: number, d
 
 /**
  * Add a closed outline to a path.
- *
  * @param path receives it
  * @param outline flat polygon
  * @param ox subtracted from x [m]

@@ -6,7 +6,6 @@ import type { Shown } from '../store.js';
 
 /**
  * Copy the current state into the kept one.
- *
  * @param kept of the frame before, refilled; null makes a new one
  * @param shown of Store.displayed
  * @returns {t, n, k, epoch, vehicles, objects}

@@ -2,12 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Traffic lights: the lamps in their housing, and the state across the end of each lane. */
 
+import { LIT } from '../lights.js';
+
 import type { Light, Scene } from '../messages.js';
 import type { View } from './painter.js';
 
-const LIT: Record<string, string[] | undefined> = {
-  red: ['red'], redYellow: ['red', 'yellow'], yellow: ['yellow'], green: ['green'],
-};
 // Lamps differ in place too, for colour-blind users.
 const LAMPS = [['red', '#ff4b3e'], ['yellow', '#ffc933'], ['green', '#19c37d']];
 const OFF = '#3a3f47';
@@ -25,7 +24,6 @@ const HIDDEN_BELOW = 1.2;
 export class SignalLayer {
   #lights: (Light & { ends: number[][] })[] = [];
 
-  /** @param scene the scene document */
   load(scene: Scene) {
     const lanelets = new Map(scene.lanelets.map((lanelet) => [lanelet.id, lanelet]));
     this.#lights = scene.lights.map((light) => ({

@@ -39,7 +39,6 @@ export interface ToolbarState {
 
 /**
  * Put the buttons on the world.
- *
  * @param root the element that holds the canvas
  * @returns update shows the state
  */
@@ -85,7 +84,6 @@ export function createToolbar(root: HTMLElement,
 
 /**
  * Make a button of the toolbar.
- *
  * @param root group that receives it
  * @param strokes SVG path of its picture in a square of 24
  * @param title what it does
@@ -109,11 +107,7 @@ export function toolButton(root: HTMLElement, strokes: string, title: string,
   return button;
 }
 
-/**
- * Show whether the switch of a button is on.
- *
- * @param pressed whether it is on
- */
+/** Show whether the switch of a button is on; `pressed`: whether it is on. */
 export function press(button: HTMLElement, pressed: boolean) {
   button.setAttribute('aria-pressed', String(pressed));
 }

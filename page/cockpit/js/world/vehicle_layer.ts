@@ -5,8 +5,8 @@
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { LIGHT, shining } from '../lights.js';
 import { BrakeLights } from './brake_lights.js';
-import { drawOutline } from './hollow.js';
-import { vehicleLook, TYRE } from './vehicle_shape.js';
+import { colorNameOf } from './palette.js';
+import { TYRE, vehicleLook } from './vehicle_shape.js';
 
 import type { Pose, Scene, SceneObject, SceneVehicle } from '../messages.js';
 import type { Shown } from '../store.js';
@@ -39,22 +39,20 @@ export class VehicleLayer {
   hollow: ChooseHollow = () => null;
   brakeLights = new BrakeLights();
 
-  /** @param scene the scene document */
   load(scene: Scene) {
     this.vehicles = scene.vehicles.map((vehicle) => ({
       ...vehicle, look: vehicleLook(vehicle.type, vehicle.shape, true),
-      color: vehicle.role === 'human' ? 'human' : 'av',
+      color: colorNameOf(vehicle),
     }));
     this.objects = scene.objects.map((object) => ({
       ...object, look: vehicleLook(object.type, object.shape, object.role !== 'static'),
-      color: colorOf(object),
+      color: colorNameOf(object),
     }));
     this.brakeLights.load(this.objects.length);
   }
 
   /**
    * Return the pose of the centre of a driven vehicle or an object in the frame shown last.
-   *
    * @param id of it
    * @param shown of Store.displayed
    * @returns null while it is absent
@@ -74,7 +72,6 @@ export class VehicleLayer {
 
   /**
    * Return the vehicle or object at a point of the canvas.
-   *
    * @returns the id of the nearest within a finger's reach
    */
   pick(px: number, py: number, { camera, shown }: LiveView): string | null {
@@ -146,7 +143,7 @@ export class VehicleLayer {
       drawLights(context, view, vehicle, shown.vehicles[row + VEHICLE.lights]);
     }
     const trouble = store.status?.drivability?.[vehicle.id];
-    if (trouble?.collision || store.seats[vehicle.id]?.holder === store.me.id) {
+    if (trouble?.collision || store.holds(vehicle.id)) {
       camera.enterPose(context, ratio, x, y, yaw, factor);
       context.strokeStyle = trouble?.collision ? palette.alarm : palette.label;
       context.lineWidth = (trouble?.collision ? 3.5 : 1.6) / (camera.scale * factor);
@@ -209,7 +206,6 @@ function drawTyres(context: CanvasRenderingContext2D, { camera, ratio, palette }
 
 /**
  * Draw indicators at the corners, blue lights on the roof, and the horn as arcs ahead.
- *
  * @param context in the vehicle's coordinates
  */
 function drawLights(context: CanvasRenderingContext2D, { shown, palette }: LiveView,
@@ -252,9 +248,44 @@ function centerOf({ rear_to_center: ahead }: SceneVehicle, rows: Float64Array,
     } : null;
 }
 
-function colorOf({ type, role }: SceneObject): ColorName {
-  if (type === 'pedestrian' || type === 'bicycle') {
-    return 'vulnerable';
+const FILL_ALPHA = 0.1;
+const LINE_PX = 1.8;
+const DASH_PX = [4, 3];
+// Radius of the ring around a person, who is small [px].
+const RING_PX = 7;
+const RING_DASH_PX = [5, 4];
+
+/**
+ * Draw the outline of a thing.
+ * @param view camera, palette and ratio
+ * @param thing with its look and color
+ * @param x of its centre [m]
+ * @param y [m]
+ * @param yaw [rad]
+ * @param leastPx its least length on the screen [px]
+ * @returns factor by which it is enlarged
+ */
+function drawOutline(context: CanvasRenderingContext2D,
+  { camera, palette, ratio }: Pick<View, 'camera' | 'palette' | 'ratio'>, thing: Thing, x: number,
+  y: number, yaw: number, leastPx: number): number {
+  const { look } = thing;
+  const factor = Math.max(1, leastPx / (look.extent * camera.scale));
+  const pixel = 1 / (camera.scale * factor);
+  camera.enterPose(context, ratio, x, y, yaw, factor);
+  context.fillStyle = palette[thing.color];
+  context.globalAlpha = FILL_ALPHA;
+  context.fill(look.body);
+  context.globalAlpha = 1;
+  context.strokeStyle = palette[thing.color];
+  context.lineWidth = LINE_PX * pixel;
+  context.setLineDash(DASH_PX.map((length) => length * pixel));
+  context.stroke(look.body);
+  if (thing.color === 'vulnerable') {
+    context.setLineDash(RING_DASH_PX.map((length) => length * pixel));
+    context.beginPath();
+    context.arc(0, 0, 0.5 * look.extent + RING_PX * pixel, 0, 2 * Math.PI);
+    context.stroke();
   }
-  return role === 'traffic' || role === 'scripted' || role === 'static' ? role : 'recorded';
+  context.setLineDash([]);
+  return factor;
 }

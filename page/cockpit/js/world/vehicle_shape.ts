@@ -23,7 +23,6 @@ const CARS = new Set(['car', 'parkedVehicle', 'taxi', 'priorityVehicle', 'unknow
 
 /**
  * Build the look of a vehicle or obstacle.
- *
  * @param type CommonRoad obstacle type
  * @param moves whether it has a front
  * @returns paths around the shape's centre

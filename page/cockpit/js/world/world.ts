@@ -23,8 +23,6 @@ import type { ChooseHollow, DrawnVehicle } from './vehicle_layer.js';
 const FRAMES_KEPT = 600;
 // A canvas whose height changes by more than this factor counts as a new map [-].
 const OTHER_SIZE = 1.6;
-const REDRAWN_ON = ['state', 'objects', 'plan', 'prediction', 'perception',
-  'signals', 'status', 'seats', 'events', 'epoch', 'hello'] as const;
 
 export interface Options {
   connection?: Connection | null; // receives the wanted layers
@@ -58,11 +56,8 @@ export class World {
   #away = false;
   #view: View;
 
-  /**
-   * @param canvas its parent gets the toolbar
-   * @param store what is shown
-   */
-  constructor(canvas: HTMLCanvasElement, store: Store, options: Options) {
+  /** @param canvas its parent gets the toolbar */
+  constructor(canvas: HTMLCanvasElement, store: Store, options: Options = {}) {
     this.#canvas = canvas;
     this.#context = canvas.getContext('2d', { alpha: false }) as CanvasRenderingContext2D;
     this.#store = store;
@@ -71,7 +66,7 @@ export class World {
     this.#sight = options.sight ?? (() => null);
     this.#view = {
       camera: this.camera, palette: this.#palette, ratio: 1, store, scene: null, shown: null,
-      now_ms: 0, insight: true,
+      insight: true,
     };
     this.#attachHands(options);
     this.#attachSizes(options.covered ?? null);
@@ -103,7 +98,6 @@ export class World {
 
   /**
    * Keep the camera on a vehicle or object.
-   *
    * @param id null releases the camera
    * @param headingUp turn the map so that it drives upwards; as before by default
    */
@@ -111,10 +105,7 @@ export class World {
     this.#navigation.follow(id, headingUp);
   }
 
-  /**
-   * @param index of a driven vehicle
-   * @returns undefined for none
-   */
+  /** Return a driven vehicle, undefined for none. */
   vehicle(index: number): DrawnVehicle | undefined {
     return this.#painter.vehicles.vehicles[index];
   }
@@ -126,8 +117,7 @@ export class World {
 
   /**
    * Show or hide a layer.
-   *
-   * @param name plans, predictions, goals, arrows, labels or object_labels, or one that was added
+   * @param name plans, predictions, goals, labels or object_labels, or one that was added
    * @param on whether it is shown
    * @throws {RangeError} when there is no such layer
    */
@@ -139,12 +129,7 @@ export class World {
     this.#changed();
   }
 
-  /**
-   * Add an external layer.
-   *
-   * @param name for setLayer
-   * @param draw called in each frame
-   */
+  /** Add an external layer; `name` for setLayer; `draw` called in each frame. */
   addLayer(name: string, draw: DrawLayer, where: Place = 'below') {
     this.#painter.add(name, draw, where);
     this.redraw();
@@ -152,7 +137,6 @@ export class World {
 
   /**
    * Set a function that chooses which things are drawn as outlines.
-   *
    * @param choose called in each frame with the input of layers; returns 1 for each vehicle, then
    *   object, that is hollow, null for none
    */
@@ -223,10 +207,8 @@ export class World {
     store.on('scene', (scene) => this.#load(scene));
     store.on('objects', (step) => this.#painter.vehicles.brakeLights.update(step));
     store.on('hello', () => this.#sendLayers());
-    store.on('events', () => this.#painter.plans.applyEvents(store.scene, store.fired));
-    for (const name of REDRAWN_ON) {
-      store.on(name, () => this.redraw());
-    }
+    store.on(['state', 'objects', 'plan', 'prediction', 'perception', 'signals', 'status', 'seats',
+      'events', 'epoch', 'hello'], () => this.redraw());
   }
 
   #resize(covered: HTMLElement | null) {
@@ -260,7 +242,6 @@ export class World {
   #load(scene: Scene) {
     this.#painter.load(scene);
     this.#view.scene = scene;
-    this.#painter.plans.applyEvents(scene, this.#store.fired);
     this.#navigation.load(scene, this.#follow);
   }
 
@@ -310,7 +291,6 @@ export class World {
     this.#hideUnseen();
     this.#navigation.steer(this.#poseOf(this.followed), this.stats.frames > 1);
     this.camera.update(now_ms);
-    this.#view.now_ms = now_ms;
     this.#painter.paint(this.#context, this.#view);
     this.stats.frame_ms[this.stats.frames % FRAMES_KEPT] = performance.now() - begin_ms;
     this.stats.frames += 1;
@@ -323,16 +303,4 @@ function coverOf(canvas: HTMLElement, covered: HTMLElement | null): number {
     return 0;
   }
   return Math.max(canvas.getBoundingClientRect().bottom - covered.getBoundingClientRect().top, 0);
-}
-
-/**
- * Show a store's world on a canvas.
- *
- * @param canvas fills its parent
- * @param store what is shown
- * @returns draws from now on
- */
-export function createWorld(canvas: HTMLCanvasElement, store: Store,
-  options: Options = {}): World {
-  return new World(canvas, store, options);
 }

@@ -47,7 +47,6 @@ export class MeshBuilder {
 
   /**
    * Add a box, which may be narrower at its top.
-   *
    * @param taper how much narrower the top is, on each side [m]
    */
   box([x0, y0, z0]: Point, [x1, y1, z1]: Point, tint: Tint,
@@ -65,7 +64,6 @@ export class MeshBuilder {
 
   /**
    * Add a round body along an axis, with its ends.
-   *
    * @param length along the axis [m]
    * @param radius [m]
    * @param tint of its side
@@ -94,7 +92,6 @@ export class MeshBuilder {
 
   /**
    * Add a skin over cross-sections, all of the same number of points.
-   *
    * @param sections from the back to the front, each from the right to the left over the top
    * @param tint of the strip between a section and the next, and between a point and the next
    */
@@ -108,11 +105,7 @@ export class MeshBuilder {
     return this;
   }
 
-  /**
-   * Return the painted triangles, or all others.
-   *
-   * @returns of all corners, flat, three numbers each
-   */
+  /** Return the painted triangles, or all others: of all corners, flat, three numbers each. */
   arrays(painted: boolean): Record<'positions' | 'normals' | 'colors', Float32Array> {
     const chosen = (values: ArrayLike<number>) => new Float32Array(Array.prototype.filter.call(
       values, (_, i) => this.#painted[Math.floor(i / 9)] === painted));

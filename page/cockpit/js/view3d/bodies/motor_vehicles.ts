@@ -172,12 +172,7 @@ function ends(mesh: MeshBuilder, sections: Section[]) {
   }
 }
 
-/**
- * @param x of both [m]
- * @param half width of the flank [m]
- * @param z [m]
- * @param size height [m]
- */
+/** `x` of both [m]; `half`: width of the flank [m]; `z` [m]; `size`: height [m]. */
 function mirrors(mesh: MeshBuilder, x: number, half: number, z: number, size = 0.14) {
   for (const side of [-1, 1]) {
     const [y0, y1] = [side * half * 0.95, side * (half + 0.18)].sort((a, b) => a - b);
@@ -185,11 +180,7 @@ function mirrors(mesh: MeshBuilder, x: number, half: number, z: number, size = 0
   }
 }
 
-/**
- * Dark discs behind the wheels.
- *
- * @param half width of the flank [m]
- */
+/** Dark discs behind the wheels; `half`: width of the flank [m]. */
 function arches(mesh: MeshBuilder,
   { front, rear, radius }: { front: number; rear: number; radius: number }, half: number) {
   for (const x of [front, rear]) {
@@ -197,11 +188,7 @@ function arches(mesh: MeshBuilder,
   }
 }
 
-/**
- * Add the unlit lamps to a vehicle: headlights and red lenses.
- *
- * @returns the same
- */
+/** Add the unlit lamps to a vehicle: headlights and red lenses; return the same. */
 export function withLamps(body: Body): Body {
   if (body.lamps !== null) {
     const { front, rear, size: [width, height] } = body.lamps;
@@ -213,11 +200,7 @@ export function withLamps(body: Body): Body {
   return body;
 }
 
-/**
- * @param side 1 for the left one, -1 for the right one
- * @param width [m]
- * @param height [m]
- */
+/** `side`: 1 for the left one, -1 for the right one; `width` [m]; `height` [m]. */
 function lamp(mesh: MeshBuilder, [x, y, z]: Point, side: number, width: number, height: number,
   tint: Tint) {
   mesh.box([x - 0.03, side * y - 0.5 * width, z - 0.5 * height],

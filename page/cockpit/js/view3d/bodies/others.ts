@@ -58,7 +58,6 @@ export function pedestrian(): Body {
 
 /**
  * A thing of which only the outline is known.
- *
  * @param vertices of its outline, flat, either way around [m]
  * @param height [m]
  */
@@ -93,11 +92,7 @@ export function prism(vertices: number[], height: number): Body {
     width: Math.max(...ys) - Math.min(...ys), height, wheels: null, lamps: null };
 }
 
-/**
- * @param x of the seat [m]
- * @param z of the seat [m]
- * @param lean how far the shoulders are ahead [m]
- */
+/** `x` of the seat [m]; `z` of the seat [m]; `lean`: how far the shoulders are ahead [m]. */
 function rider(mesh: MeshBuilder, x: number, z: number, lean: number) {
   const section = (at: number, half: number, height: number): Point[] => [
     [at + 0.1, -half, height], [at + 0.1, half, height], [at - 0.1, half, height],

@@ -26,7 +26,6 @@ const SKINS: Record<string, { rows: Row[]; glass: number[]; windows: number[] } 
 
 /**
  * Make the plain shape of a body, with the same size and places of windows, wheels and lamps.
- *
  * @param key of its appearance, which begins with its kind
  * @returns null if it has few triangles anyway
  */
@@ -56,11 +55,7 @@ export function plainBody(key: string, body: Body): MeshBuilder | null {
   return mesh;
 }
 
-/**
- * @param l half length [m]
- * @param w half width [m]
- * @param height [m]
- */
+/** `l`: half length [m]; `w`: half width [m]; `height` [m]. */
 function addSkin(mesh: MeshBuilder, { rows, glass, windows }: NonNullable<typeof SKINS[string]>,
   l: number, w: number, height: number) {
   const sections = rows.map(([x, half, sill, belt, top, roof]) => {

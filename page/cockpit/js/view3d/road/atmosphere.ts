@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Light and air: the sky, the sun and the fog. */
 
+import { DEGREE } from '../../units.js';
 import { airFog, extinction, fogAsAirDoes } from './fog.js';
 
 import type { BufferGeometry, Group, Mesh, ShaderMaterial } from 'three';
@@ -89,7 +90,6 @@ export class Atmosphere {
   /** The fog of every material. */
   fog;
 
-  /** @param three the library */
   constructor(three: Three) {
     fogAsAirDoes(three);
     this.#three = three;
@@ -170,7 +170,7 @@ function ringed(three: Three): BufferGeometry {
   const indices = [];
   for (const [ring, height] of RINGS_DEG.entries()) {
     for (let i = 0; i <= AROUND; i += 1) {
-      const [up, around] = [height * Math.PI / 180, 2 * Math.PI * i / AROUND];
+      const [up, around] = [height * DEGREE, 2 * Math.PI * i / AROUND];
       positions.push(Math.cos(up) * Math.cos(around), Math.cos(up) * Math.sin(around),
         Math.sin(up));
       const last = ring * (AROUND + 1) + i;

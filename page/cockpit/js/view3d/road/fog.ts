@@ -8,7 +8,6 @@ import type { Three } from '../three.js';
 /**
  * Return the extinction of air: at the meteorological visibility 5 % of a contrast is left. As
  * usual, 3 replaces -ln 0.05 = 2.996.
- *
  * @param visibility meteorological [m]
  * @returns extinction coefficient [1/m]
  */
@@ -18,7 +17,6 @@ export function extinction(visibility: number): number {
 
 /**
  * Return the share of a contrast that is left.
- *
  * @param distance [m]
  * @param visibility meteorological [m]
  */
@@ -60,11 +58,7 @@ const FRAGMENT = `#ifdef USE_FOG
   gl_FragColor = linearToOutputTexel( gl_FragColor );
 #endif`;
 
-/**
- * Change the fog of all the library's materials to that of air; call before the first picture.
- *
- * @param three the library
- */
+/** Change the fog of all the library's materials to that of air; call before the first picture. */
 export function fogAsAirDoes(three: Three) {
   three.ShaderChunk.fog_pars_vertex = DECLARED;
   three.ShaderChunk.fog_vertex = VERTEX;
@@ -76,8 +70,6 @@ export function fogAsAirDoes(three: Three) {
 /**
  * Make the fog of a scene. Materials get its linear light, where the library would pass the colour
  * encoded for the screen.
- *
- * @param three the library
  * @returns of no density
  */
 export function airFog(three: Three): FogExp2 {

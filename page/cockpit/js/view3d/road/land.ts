@@ -25,8 +25,6 @@ const RANK = -2;
 
 /**
  * Build the land of a scene in tiles, of which a picture draws the visible ones.
- *
- * @param scene the scene document
  * @returns the same tiles with few triangles, none where the land is not flat, and its height at
  *   points within it [m]
  */
@@ -82,11 +80,7 @@ function everyFourth(range: number[]): number[] {
   return range.filter((_, i) => i % 4 === 0 || i === range.length - 1);
 }
 
-/**
- * @param parts empty
- * @param rows of corners
- * @returns the same
- */
+/** Fill empty `parts` and return them; `rows` of corners. */
 function buildTile(parts: MeshParts, corner: Corner, rows: number[],
   columns: number[]): MeshParts {
   for (const [i, row] of rows.entries()) {
@@ -104,7 +98,6 @@ function buildTile(parts: MeshParts, corner: Corner, rows: number[],
 /**
  * Compute the heights of the land under the roads: each corner is under the lowest road of the
  * cells around it, or, without one, as high as the corners around it.
- *
  * @param cell [m]
  * @param count of cells along an edge
  * @returns by row and column [m]; null for a flat map
@@ -142,11 +135,7 @@ function lower(lowest: Float64Array, width: number, row: number, column: number,
   }
 }
 
-/**
- * Fill unknown heights from their neighbours, ring by ring.
- *
- * @param heights Infinity if unknown
- */
+/** Fill unknown heights from their neighbours, ring by ring; `heights`: Infinity if unknown. */
 function spread(heights: Float64Array, width: number): Float64Array {
   let unknown = [...heights.keys()].filter((i) => heights[i] === Infinity);
   while (unknown.length > 0) {

@@ -10,7 +10,7 @@ import type { Three } from '../three.js';
 
 const GRAIN_PX = 256;
 /** The edge of the grain's square on the road [m]. */
-export const GRAIN_M = 6;
+const GRAIN_M = 6;
 // Offset of one rank in normalised depth: some 30 steps of a buffer of 24 bits, and at 100 m,
 // seen from a car, 3 mm of height.
 const RANK_DEPTH = 4e-6;
@@ -20,7 +20,6 @@ export const GRAIN_ANISOTROPY = 8;
 
 /**
  * Return a grain as of asphalt, whose motion conveys speed.
- *
  * @returns grey, repeated, never darker than two thirds
  */
 export function grainTexture(three: Three): DataTexture {
@@ -45,10 +44,9 @@ export function grainTexture(three: Three): DataTexture {
 
 /**
  * Make ranks decide which of two flat things at one height is visible.
- *
  * @param material of meshes with an attribute `rank`
  */
-export function ranked<M extends Material>(material: M): M {
+function ranked<M extends Material>(material: M): M {
   material.onBeforeCompile = (shader) => {
     shader.vertexShader = `attribute float rank;\n${shader.vertexShader}`.replace(
       '#include <project_vertex>',

@@ -35,7 +35,6 @@ export class MeshParts {
 
   /**
    * Add the strip between two lines with as many points each.
-   *
    * @param left flat polyline
    * @param right flat polyline
    */
@@ -52,7 +51,6 @@ export class MeshParts {
 
   /**
    * Add a polygon that is visible from above.
-   *
    * @param ring flat polygon
    * @param faces three indices of its points for each triangle
    */
@@ -73,7 +71,6 @@ export class MeshParts {
 
   /**
    * Add an upright band along a line: the side of a kerb, or of an embankment.
-   *
    * @param line flat polyline; the wall is visible from its right
    */
   addWall(line: number[], bottom: Heights, top: Heights, color: Rgb) {

@@ -28,7 +28,6 @@ export class Obstacles {
   #map: OccupancyFrame | null = null;
   mesh;
 
-  /** @param three the library */
   constructor(three: Three, origin: Origin, heights: Heights, painted: Material) {
     this.#three = three;
     this.#origin = origin;
@@ -70,7 +69,6 @@ export class Obstacles {
 
 /**
  * Join the occupied cells to blocks, along rows and across equal rows.
- *
  * @returns that hold each occupied cell once, MOST_BLOCKS at most
  */
 export function blocksOf(

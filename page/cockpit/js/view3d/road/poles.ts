@@ -25,7 +25,7 @@ const SAME_SIGN_M = 15;
 const LIGHTS_APART_M = 0.7;
 
 /** Find a place for a pole: as in the map, else to the right of its traffic, or the left. */
-export function poleAt({ x, y, yaw }: { x: number; y: number; yaw: number },
+function poleAt({ x, y, yaw }: { x: number; y: number; yaw: number },
   index: RoadIndex): Pole {
   const right = { x: Math.sin(yaw), y: -Math.cos(yaw) };
   for (const side of [1, -1]) {
@@ -44,8 +44,6 @@ export function poleAt({ x, y, yaw }: { x: number; y: number; yaw: number },
  *
  * A sign that the map repeats for each lanelet, as most limits, gets one plate for all lanes,
  * where it begins to apply.
- *
- * @param scene the scene document
  * @param index of its lanelets
  */
 export function placeSigns({ signs, lanelets }: Pick<Scene, 'signs' | 'lanelets'>,
@@ -71,8 +69,6 @@ export function placeSigns({ signs, lanelets }: Pick<Scene, 'signs' | 'lanelets'
 
 /**
  * Place the traffic lights of a scene; those at one place stand side by side.
- *
- * @param scene the scene document
  * @param index of its lanelets
  */
 export function placeLights({ lights }: Pick<Scene, 'lights'>, index: RoadIndex): LightPole[] {

@@ -2,12 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Random numbers that are reproducible from a seed on every machine. */
 
-/**
- * Start a sequence.
- *
- * @param seed any text
- * @returns returns the next number, from 0 to below 1
- */
+/** Return a function that returns the next number, from 0 to below 1; `seed`: any text. */
 export function randomFrom(seed: string): () => number {
   // FNV-1a for the text, mulberry32 (T. Ettinger) for the sequence.
   let state = 0x811c9dc5;

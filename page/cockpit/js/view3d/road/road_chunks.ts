@@ -20,12 +20,7 @@ const BANK_M = 2;
 
 export type Triangulate = (ring: number[]) => ArrayLike<number>; // flat polygon to index triples
 
-/**
- * Build the parts of a scene's roads.
- *
- * @param scene the scene document
- * @param index of its lanelets
- */
+/** Build the parts of a scene's roads; `index` of its lanelets. */
 export function buildRoads(scene: Scene, origin: Origin, index: RoadIndex, heights: Heights,
   triangulate: Triangulate): MeshParts[] {
   const [xmin, ymin, xmax, ymax] = scene.bounds;
@@ -72,11 +67,7 @@ function addPavement(parts: MeshParts, lanelet: Lanelet, heights: Heights,
     heights, color, rank);
 }
 
-/**
- * Close the gap between a road and the land, which lies lower.
- *
- * @param line bound of a lanelet
- */
+/** Close the gap between a road and the land, which lies lower; `line`: bound of a lanelet. */
 function addBank(parts: MeshParts, line: number[], isLeft: boolean, heights: Heights) {
   // Visible from outside, facing away from the road.
   const seen = isLeft ? reversed(line) : line;
@@ -85,7 +76,6 @@ function addBank(parts: MeshParts, line: number[], isLeft: boolean, heights: Hei
 
 /**
  * Triangulate a lanelet from bound to bound, between points abreast, as its heights require.
- *
  * @returns indices into its outline, which returns along the right bound
  */
 export function ladder({ left, right }: Pick<Lanelet, 'left' | 'right'>): number[] {
@@ -105,10 +95,7 @@ export function ladder({ left, right }: Pick<Lanelet, 'left' | 'right'>): number
   return faces;
 }
 
-/**
- * @param line flat polyline
- * @returns of each point the share of the length up to it
- */
+/** Return each point's share of the length up to it; `line`: flat polyline. */
 function sharesOf(line: number[]): number[] {
   const lengths = [0];
   for (let i = 2; i < line.length; i += 2) {

@@ -33,11 +33,7 @@ export class RoadIndex {
     }
   }
 
-  /**
-   * Return the lanelets whose box is within a distance of a point.
-   *
-   * @param reach [m]
-   */
+  /** Return the lanelets whose box is within a distance of a point; `reach` [m]. */
   near(x: number, y: number, reach: number): Set<Place> {
     const found = new Set<Place>();
     this.#eachCell([x - reach, y - reach, x + reach, y + reach], (column, row) => {
@@ -53,7 +49,6 @@ export class RoadIndex {
 
   /**
    * Return whether a circle touches no lanelet.
-   *
    * @param x of its centre
    * @param y of its centre
    * @param radius [m]
@@ -69,7 +64,6 @@ export class RoadIndex {
 
   /**
    * Return whether a point lies well within a lanelet that is neither this one nor beside it.
-   *
    * @param depth least distance to the other's outline [m]
    */
   isWithinAnother(x: number, y: number, own: Lanelet, depth: number) {
@@ -84,7 +78,6 @@ export class RoadIndex {
 
   /**
    * Return the height of the road: of the highest bridge at a crossing, beside it of the nearest.
-   *
    * @returns [m], 0 on a flat map, and far from every road
    */
   heightAt(x: number, y: number): number {
@@ -123,11 +116,7 @@ export class RoadIndex {
   }
 }
 
-/**
- * Return a lanelet's height at a point, interpolated between both bounds.
- *
- * @returns [m]
- */
+/** Return a lanelet's height at a point [m], interpolated between both bounds. */
 export function heightOn({ left, right, left_z, right_z }: Lanelet, x: number, y: number): number {
   if (!left_z || !right_z) {
     return 0;

@@ -59,11 +59,7 @@ export class RoadPaint {
     this.#yellow = YELLOW_CENTRES.includes(country);
   }
 
-  /**
-   * Add the paint or kerb along a boundary.
-   *
-   * @param lanelet whose boundary it is
-   */
+  /** Add the paint or kerb along a boundary; `lanelet` whose boundary it is. */
   addBoundary(parts: MeshParts, boundary: Boundary, lanelet: Lanelet) {
     for (const stroke of strokesOf(boundary, lanelet)) {
       const line = shifted(boundary.line, stroke.offset);
@@ -163,7 +159,6 @@ export function densified(line: number[], step: number): number[] {
 
 /**
  * Return a line without the points that lie straight between their neighbours.
- *
  * @param line flat polyline
  */
 function straightened(line: number[]): number[] {
@@ -181,10 +176,7 @@ function straightened(line: number[]): number[] {
   return kept;
 }
 
-/**
- * @param line flat polyline
- * @returns in reverse order
- */
+/** Return a flat polyline in reverse order. */
 export function reversed(line: number[]): number[] {
   const back = [];
   for (let i = line.length - 2; i >= 0; i -= 2) {

@@ -6,22 +6,22 @@ import { localOrigin } from '../local_origin.js';
 import { Atmosphere } from './atmosphere.js';
 import { buildLand } from './land.js';
 import { geometryOf, GRAIN_ANISOTROPY, grainTexture, paintedMaterial } from './materials.js';
-import { buildRoads } from './road_chunks.js';
 import { Obstacles } from './obstacles.js';
 import { placeLights, placeSigns } from './poles.js';
+import { buildRoads } from './road_chunks.js';
 import { RoadIndex } from './road_index.js';
 import { placeRoadside } from './roadside.js';
-import { Scenery } from './scenery.js';
+import { Scenery } from './scenery_shapes.js';
 import { Signs } from './signs.js';
 import { TrafficLights } from './traffic_lights.js';
 
 import type { FogExp2, Group, Mesh, Object3D } from 'three';
-import type { MeshParts } from './mesh_parts.js';
 import type { Environment, Scene } from '../../messages.js';
 import type { Store } from '../../store.js';
+import type { Named } from '../contents.js';
 import type { Sight } from '../seen_instances.js';
 import type { Three } from '../three.js';
-import type { Named } from '../contents.js';
+import type { MeshParts } from './mesh_parts.js';
 
 const LAND_ORDER = 900;
 
@@ -34,7 +34,7 @@ export interface RoadWorld {
   // shows another time of day or visibility than the scene document's
   setEnvironment: (environment: Environment) => void;
   // called before each picture, after `store.displayed(now_ms)`; eye is that of the main camera
-  update: (store: Store, now_ms: number, eye: Point) => void;
+  update: (store: Store, eye: Point) => void;
   // called before each camera draws, after `update`; else everything near is drawn
   see: (sight: Sight) => void;
   heightAt: (x: number, y: number) => number; // of the road at a point of the map [m]
@@ -42,18 +42,11 @@ export interface RoadWorld {
   solids: Named[]; // signs and traffic lights
   triangles: number; // in the whole group, at most
   drawCalls: number; // at most, if all of it is visible
-  build_ms: number; // build time
   dispose: () => void; // frees the memory of the graphics card
 }
 
-/**
- * Build the world of a scene.
- *
- * @param three the library
- * @param scene the scene document
- */
+/** Build the world of a scene. */
 export function createRoadWorld(three: Three, scene: Scene): RoadWorld {
-  const begin_ms = performance.now();
   const origin = localOrigin(scene);
   const index = new RoadIndex(scene.lanelets);
   const heightAt = (x: number, y: number): number => index.heightAt(x, y);
@@ -89,7 +82,7 @@ export function createRoadWorld(three: Three, scene: Scene): RoadWorld {
   return {
     group, fog: atmosphere.fog, heightAt, solids: [...signs.solids, ...lights.solids],
     setEnvironment: (environment) => atmosphere.set(environment),
-    update(store, _now_ms, eye) {
+    update(store, eye) {
       scenery.update(eye);
       signs.update(eye);
       lights.update(store.signals.states, eye);
@@ -111,7 +104,6 @@ export function createRoadWorld(three: Three, scene: Scene): RoadWorld {
     triangles: meshes.reduce((sum, { geometry }) => sum + (geometry.index?.count ?? 0) / 3,
       standing.reduce((sum, part) => sum + part.triangles, atmosphere.triangles)),
     drawCalls: all.length - plainTiles.length + 1,
-    build_ms: performance.now() - begin_ms,
     dispose() {
       atmosphere.dispose();
       standing.forEach((part) => part.dispose());

@@ -66,7 +66,6 @@ class RoadPoints {
 
   /**
    * Return whether every road around is on the near side of a line.
-   *
    * @param x of a point of the line
    * @param yaw normal of the line, to its far side [rad]
    */
@@ -96,7 +95,6 @@ class Taken {
 
   /**
    * Occupy a circle, unless another one touches it.
-   *
    * @param radius at most half a cell [m]
    * @returns whether it was free
    */
@@ -116,12 +114,7 @@ class Taken {
   }
 }
 
-/**
- * Place all objects, always alike for the same scene.
- *
- * @param scene the scene document
- * @param index of its lanelets
- */
+/** Place all objects, always alike for the same scene; `index` of its lanelets. */
 export function placeRoadside({ id, bounds, lanelets }: Pick<Scene, 'id' | 'bounds' | 'lanelets'>,
   index: RoadIndex): Roadside {
   const random = randomFrom(id);
@@ -176,10 +169,7 @@ class Edge {
     return { x, y, yaw: yaw + this.outward };
   }
 
-  /**
-   * @param spacing [m]
-   * @returns distances along the line whose station is a multiple of the spacing
-   */
+  /** Return the distances along the line whose station is a multiple of the spacing [m]. */
   multiples(spacing: number): number[] {
     const found = [];
     for (let s = Math.ceil(this.station / spacing) * spacing - this.station; s < this.length;
@@ -192,7 +182,6 @@ class Edge {
 
 /**
  * Return the stations along the roads: a lanelet begins where its predecessor ends.
- *
  * @returns station of each start, by id [m]
  */
 export function stationsOf(lanelets: Lanelet[]): Map<number, number> {
@@ -219,10 +208,7 @@ export function stationsOf(lanelets: Lanelet[]): Map<number, number> {
   return stations;
 }
 
-/**
- * @param spacing [m]
- * @param beside [m]
- */
+/** `spacing` [m]; `beside` [m]. */
 function placeRow(row: Stand[], edge: Edge, spacing: number, beside: number, index: RoadIndex,
   taken: Taken) {
   for (const s of edge.multiples(spacing)) {
@@ -271,7 +257,6 @@ function placeHouses(houses: Stand[], edge: Edge, index: RoadIndex, points: Road
 /**
  * Place groups of trees outside of the map's box, which is convex, so that no line of sight
  * crosses them.
- *
  * @param bounds of the map
  */
 function placeAround({ trees, firs }: Roadside, [xmin, ymin, xmax, ymax]: Box, taken: Taken,

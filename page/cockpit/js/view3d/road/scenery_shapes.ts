@@ -1,10 +1,17 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The shapes of roadside objects; trees and houses have unit size. */
+/** Roadside objects and their shapes; trees and houses have unit size. */
 
+import { geometryOf } from './materials.js';
 import { MeshParts } from './mesh_parts.js';
+import { NearInstances } from './near_instances.js';
 
-import type { Rgb } from './mesh_parts.js';
+import type { Material } from 'three';
+import type { Origin } from '../local_origin.js';
+import type { Sight } from '../seen_instances.js';
+import type { Three } from '../three.js';
+import type { Heights, Rgb } from './mesh_parts.js';
+import type { Roadside } from './roadside.js';
 
 const COLOR: Record<string, Rgb> = {
   white: [238, 238, 234], black: [36, 36, 38], reflector: [236, 236, 255], steel: [128, 132, 136],
@@ -20,7 +27,6 @@ const shapeParts = () => new MeshParts({ x: 0, y: 0 });
 
 /**
  * Add a body of revolution around the vertical: a trunk, a cone, a ball of a few rings.
- *
  * @param profile from below
  * @param round how many corners it has
  */
@@ -55,7 +61,7 @@ export function addBox(parts: MeshParts, [x0, y0, z0]: [x: number, y: number, z:
 }
 
 /** A delineator (sign 620), 1 m above the road. */
-export function post() {
+function post() {
   const parts = shapeParts();
   addBox(parts, [-0.06, -0.05, -0.3], [0.06, 0.05, 0.68], COLOR.white);
   addBox(parts, [-0.061, -0.051, 0.68], [0.061, 0.051, 0.92], COLOR.black);
@@ -65,7 +71,7 @@ export function post() {
 }
 
 /** A delineator of few triangles. */
-export function plainPost() {
+function plainPost() {
   const parts = shapeParts();
   addBox(parts, [-0.06, -0.05, -0.3], [0.06, 0.05, 1.0], COLOR.white);
   addBox(parts, [-0.061, -0.051, 0.68], [0.061, 0.051, 0.92], COLOR.black);
@@ -73,7 +79,7 @@ export function plainPost() {
 }
 
 /** A street lamp, whose arm reaches back over the road. */
-export function lamp() {
+function lamp() {
   const parts = shapeParts();
   addRound(parts, [[0.09, -0.3], [0.06, 6.4]], COLOR.steel);
   addBox(parts, [-1.5, -0.04, 6.3], [0, 0.04, 6.4], COLOR.steel);
@@ -82,7 +88,7 @@ export function lamp() {
 }
 
 /** A tree, whose crown begins above the eyes of car drivers. */
-export function tree() {
+function tree() {
   const parts = shapeParts();
   addRound(parts, [[0.05, -0.05], [0.035, 0.45]], COLOR.bark);
   addRound(parts, [[0.16, 0.36], [0.42, 0.45], [0.5, 0.62], [0.4, 0.84], [0.2, 0.96], [0.02, 1]],
@@ -91,7 +97,7 @@ export function tree() {
 }
 
 /** A fir. */
-export function fir() {
+function fir() {
   const parts = shapeParts();
   addRound(parts, [[0.05, -0.05], [0.04, 0.25]], COLOR.bark);
   addRound(parts, [[0.42, 0.2], [0.24, 0.5], [0.28, 0.5], [0.14, 0.76], [0.17, 0.76], [0.01, 1]],
@@ -100,7 +106,7 @@ export function fir() {
 }
 
 /** A tree of few triangles, of the same outline. */
-export function plainTree() {
+function plainTree() {
   const parts = shapeParts();
   addRound(parts, [[0.045, -0.05], [0.035, 0.4]], COLOR.bark, 3);
   addRound(parts, [[0.16, 0.36], [0.5, 0.57], [0.43, 0.8], [0.08, 0.99]], COLOR.leaves,
@@ -109,7 +115,7 @@ export function plainTree() {
 }
 
 /** A fir of few triangles, of the same outline. */
-export function plainFir() {
+function plainFir() {
   const parts = shapeParts();
   addRound(parts, [[0.045, -0.05], [0.04, 0.22]], COLOR.bark, 3);
   addRound(parts, [[0.4, 0.2], [0.01, 1]], COLOR.leaves, PLAIN_ROUND);
@@ -117,7 +123,7 @@ export function plainFir() {
 }
 
 /** A house with a ridge along the road, and windows towards it. */
-export function house() {
+function house() {
   const parts = shapeParts();
   const [eaves, ridge] = [0.68, 1];
   addBox(parts, [-0.5, -0.5, -0.1], [0.5, 0.5, eaves], COLOR.wall);
@@ -141,4 +147,56 @@ export function house() {
     parts.indices.push(...(side > 0 ? [0, 2, 1] : [0, 1, 2]).map((corner) => gable + corner));
   }
   return parts;
+}
+
+const LEAVES = [0x5f7f3c, 0x6f8f48, 0x4f7236, 0x7c9150];
+const NEEDLES = [0x3d5f3c, 0x48693f, 0x365438];
+const WALLS = [0xe6ddc9, 0xd9d3c6, 0xe9e4dc, 0xd8c3a2, 0xc9b49a, 0xdfe3e2];
+const NEAREST = { posts: [240, 700], lamps: [200, 500], trees: [420, 650], firs: [320, 650],
+  houses: [220, 800] };
+
+/** The instances of all roadside objects. */
+export class Scenery {
+  #kinds: NearInstances[] = [];
+
+  constructor(three: Three, roadside: Roadside, origin: Origin, heights: Heights,
+    painted: Material) {
+    const shapes = { posts: post(), lamps: lamp(), trees: tree(), firs: fir(), houses: house() };
+    const plain = { trees: plainTree(), firs: plainFir(), posts: plainPost(),
+      lamps: lamp(), houses: house() };
+    const tones = { posts: [0xffffff], lamps: [0xffffff], trees: LEAVES, firs: NEEDLES,
+      houses: WALLS };
+    for (const kind of Object.keys(shapes) as (keyof Roadside)[]) {
+      const instances = roadside[kind].map(({ x, y, yaw, size, shade }) => ({
+        x: x - origin.x, y: y - origin.y, z: heights(x, y), yaw, size,
+        color: tones[kind][Math.floor(shade * tones[kind].length)] }));
+      if (instances.length > 0) {
+        const [most, reach] = NEAREST[kind];
+        this.#kinds.push(new NearInstances(three, geometryOf(three, shapes[kind]),
+          painted, instances, most, reach, geometryOf(three, plain[kind])));
+      }
+    }
+  }
+
+  get meshes() {
+    return this.#kinds.flatMap(({ meshes }) => meshes);
+  }
+
+  get triangles() {
+    return this.#kinds.reduce((sum, { triangles }) => sum + triangles, 0);
+  }
+
+  update(eye: { x: number; y: number }) {
+    this.#kinds.forEach((kind) => kind.update(eye));
+  }
+
+  /** @param sight of the camera that draws next */
+  see(sight: Sight) {
+    this.#kinds.forEach((kind) => kind.see(sight));
+  }
+
+  /** Free the memory of the graphics card. */
+  dispose() {
+    this.#kinds.forEach((kind) => kind.dispose());
+  }
 }

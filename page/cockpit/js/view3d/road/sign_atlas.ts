@@ -186,7 +186,6 @@ function lines(context: Context, text: string) {
 
 /**
  * Write text as large as fits.
- *
  * @param y of its middle
  * @param room for its length
  * @param size of the letters at most

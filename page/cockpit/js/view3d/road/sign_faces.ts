@@ -7,6 +7,8 @@
  * common signs, and of TrafficSignIDUsa.
  */
 
+import { KMH } from '../../units.js';
+
 export type PlateShape = 'circle' | 'triangle' | 'yield' | 'octagon' | 'diamond' | 'square'
   | 'wide' | 'tall';
 
@@ -30,7 +32,6 @@ const blue = (symbol: string, text = ''): Face => (
 const wide = (style: Face['style'], text: string): Face => (
   { shape: 'wide', style, symbol: '', text });
 
-const KMH = 3.6;
 // Limits are multiples of this; files contain rounded values [km/h].
 const EVEN_KMH = 5;
 const NEARLY_KMH = 0.3;
@@ -114,7 +115,6 @@ const FACES: Record<string, (value: string, country: string) => Face> = {
 
 /**
  * Return the plate of a sign.
- *
  * @param kind name in commonroad-io
  * @param value additional value, as in the file
  * @param country three letters
@@ -134,7 +134,6 @@ export function faceOf(kind: string, value: string, country: string): Face {
 
 /**
  * Return a speed as written on signs.
- *
  * @param value [m/s], as the file has it
  * @returns [km/h], a multiple of 5 if it is nearly one; other text unchanged
  */

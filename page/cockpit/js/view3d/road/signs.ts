@@ -42,11 +42,7 @@ export class Signs {
   #plates;
   #poles;
 
-  /**
-   * @param three the library
-   * @param country three letters
-   * @param painted of the poles
-   */
+  /** `country`: three letters; `painted` of the poles. */
   constructor(three: Three, signs: SignPole[], country: string, origin: Origin, heights: Heights,
     painted: Material) {
     const atlas = new SignAtlas();
@@ -120,7 +116,6 @@ export class PlateQuads {
 
   /**
    * Add the plates of a pole, the first on top, and their backs.
-   *
    * @param ground its height [m]
    * @returns the heights of their edges, and the width of the widest [m]
    */
@@ -146,7 +141,6 @@ export class PlateQuads {
 
   /**
    * Add a square.
-   *
    * @param x of its middle
    * @param z [m]
    * @param yaw heading of the traffic that sees it [rad]

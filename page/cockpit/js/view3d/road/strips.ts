@@ -21,7 +21,6 @@ class Pieces {
 
 /**
  * Return the painted pieces of a line.
- *
  * @param line flat polyline [m]
  * @param dash null for all of it
  * @returns flat polylines
@@ -38,7 +37,6 @@ export function paintedPieces(line: number[], dash: Dash | null): number[][] {
 
 /**
  * Widen a line to a strip.
- *
  * @param line flat polyline [m]
  * @param width [m]
  * @returns its edges, flat, with as many points as the line

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Traffic lights: poles, housings, and lamps that show the signals of the run. */
 
+import { LIT } from '../../lights.js';
 import { geometryOf } from './materials.js';
 import { MeshParts } from './mesh_parts.js';
 import { NearInstances } from './near_instances.js';
@@ -21,11 +22,8 @@ import type { Three } from '../three.js';
 import type { Named } from '../contents.js';
 import type { Triple } from '../solid_boxes.js';
 
-/** Lamps from the top, and the lit ones of each state. */
-export const LAMPS = ['red', 'yellow', 'green'] as const;
-export const LIT: Record<string, readonly string[] | undefined> = {
-  red: ['red'], redYellow: ['red', 'yellow'], yellow: ['yellow'], green: ['green'],
-};
+/** Lamps from the top. */
+const LAMPS = ['red', 'yellow', 'green'] as const;
 const COLORS = { red: 0xff3b2c, yellow: 0xffc21f, green: 0x1fe08a };
 const OFF = 0x24272b;
 /** Middle of the lowest lamp above the road [m]. */
@@ -58,10 +56,7 @@ export class TrafficLights {
   #housings;
   #shown: (string | undefined)[];
 
-  /**
-   * @param three the library
-   * @param painted of poles and housings
-   */
+  /** @param painted of poles and housings */
   constructor(three: Three, lights: LightPole[], origin: Origin, heights: Heights,
     painted: Material) {
     this.#three = three;
@@ -105,11 +100,7 @@ export class TrafficLights {
     return 6 * this.#lights.length + this.#poles.triangles + this.#housings.triangles;
   }
 
-  /**
-   * Show the signals.
-   *
-   * @param states by the lights' ids
-   */
+  /** Show the signals; `states` by the lights' ids. */
   update(states: Record<string, string>, eye: { x: number; y: number }) {
     this.#poles.update(eye);
     this.#housings.update(eye);
@@ -152,7 +143,7 @@ function above([x, y, z]: Triple, base: number): Triple {
 }
 
 /** Draw the masks of lamps, by direction. */
-function lampMasks(): { canvas: HTMLCanvasElement; cells: Record<string, Cell> } {
+export function lampMasks(): { canvas: HTMLCanvasElement; cells: Record<string, Cell> } {
   const canvas = document.createElement('canvas');
   const names = Object.keys(ARROWS);
   canvas.width = MASK_PX * 8;
@@ -166,6 +157,7 @@ function lampMasks(): { canvas: HTMLCanvasElement; cells: Record<string, Cell> }
     context.fillStyle = '#ffffff';
     const arrows = ARROWS[name];
     if (arrows.length === 0) {
+      context.beginPath();
       context.arc(0, 0, 1, 0, 2 * Math.PI);
       context.fill();
     }
