@@ -149,7 +149,8 @@ class BagReader:
         for message in self.messages(topics, start_ns, end_ns):
             yield self.decode(message)
 
-    def readable(self, topics: Collection[str] | None = None) -> Iterator[DecodedMessage]:
+    def readable(self, topics: Collection[str] | None = None, start_ns: int | None = None,
+                 end_ns: int | None = None) -> Iterator[DecodedMessage]:
         """
         Yield messages as `decoded` does, but skip those that do not fit their type.
 
@@ -158,7 +159,7 @@ class BagReader:
 
         :raises InputError: as `messages`.
         """
-        for message in self.messages(topics):
+        for message in self.messages(topics, start_ns, end_ns):
             try:
                 yield self.decode(message)
             except InputError:
