@@ -353,12 +353,14 @@ class SimControl:
                     self._allowed(str(parameter.value), parameter.name)
                 except InputError as error:
                     return SetParametersResult(successful=False, reason=str(error))
-                self._chosen = parameter.name
         return SetParametersResult(successful=True)
 
     def _after_parameters(self, parameters: list[Parameter]) -> None:
         for parameter in parameters:
-            self.chosen_anew |= parameter.name in ('game', 'scenario')
+            if parameter.name in ('game', 'scenario'):
+                self.chosen_anew = True
+                if parameter.value:
+                    self._chosen = parameter.name
             if parameter.name == 'real_time_factor':
                 self.real_time_factor = float(parameter.value)
 
