@@ -368,8 +368,8 @@ def _simulation_in(bag: Path) -> str | None:
     """Return the simulation whose run is in a bag; None if it has not come that far."""
     try:
         with BagReader(bag) as reader:
-            for message in reader.decoded([GAME.topic]):
-                return GAME.read(message.message.data).simulation
+            for _, game in reader.documents(GAME):
+                return game.simulation
     except InputError:
         pass
     return None
