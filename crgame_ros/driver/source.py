@@ -245,10 +245,10 @@ class JoyDriver(DriverSource):
     """
 
     def __init__(self, device_map: 'DeviceMap') -> None:
-        if device_map.joy is None:
+        if device_map.keys is not None:
             raise InputError('is a keyboard, which has no joy node', device_map.name,
                              'choose the map of a wheel or gamepad')
-        self._layout = device_map.joy.layout()
+        self._layout = device_map.file.layout('joy')
         self.name = device_map.name
         self._heard_s = self._now_s = -math.inf
         self._raw = RawInput()
