@@ -25,10 +25,10 @@ from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.live_driver import DeviceDelay, live_driver, LiveForce
 from crgame_ros.ros.messages import from_time, to_joy, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.number_parameters import fixed
 from crgame_ros.ros.spinning import PromptNode, spin_promptly
 from crgame_ros.ros.trusted_code import TrustedCode
 from diagnostic_msgs.msg import DiagnosticStatus
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Joy
@@ -50,15 +50,12 @@ class DriverNode(PromptNode):
 
     def __init__(self) -> None:
         super().__init__('driver_node')
-        declare = self.declare_parameter
-        self._vehicle_id: str = declare('vehicle', 'hv0', ParameterDescriptor(
-            description="id of the human's vehicle", read_only=True)).value
-        self._choice: str = declare('source', '', ParameterDescriptor(
-            description="driver source instead of the game's: auto, idle, evdev[:NAME], "
-            'keys:FILE, joy:FILE, joy, policy:FILE.py:load', read_only=True)).value
-        self._joy_map: str = declare('joy_map', 'generic_gamepad', ParameterDescriptor(
-            description='device map for the messages of an external joy node',
-            read_only=True)).value
+        self._vehicle_id = fixed(self, 'vehicle', 'hv0', "id of the human's vehicle")
+        self._choice = fixed(
+            self, 'source', '', "driver source instead of the game's: auto, idle, evdev[:NAME], "
+            'keys:FILE, joy:FILE, joy, policy:FILE.py:load')
+        self._joy_map = fixed(self, 'joy_map', 'generic_gamepad',
+                              'device map for the messages of an external joy node')
         self._code = TrustedCode(self, self._choice)
         if self._choice:
             parse_source(self._choice)

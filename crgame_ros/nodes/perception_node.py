@@ -16,6 +16,7 @@ from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import Endpoints, NodeReport
 from crgame_ros.ros.messages import EXACT_VARIANCE, SeriesMessage, set_time
 from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.number_parameters import fixed
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
 from crgame_ros.ros.trusted_code import TrustedCode
@@ -24,7 +25,6 @@ from crgame_ros.vehicle.state import VehicleState
 from nav_msgs.msg import Odometry
 import numpy as np
 from numpy.typing import NDArray
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from sensor_msgs.msg import LaserScan
 
@@ -40,9 +40,7 @@ class PerceptionNode(Node):
 
     def __init__(self) -> None:
         super().__init__('perception_node')
-        self._vehicle_id: str = self.declare_parameter(
-            'vehicle', 'av0', ParameterDescriptor(
-                description='id of the AV that perceives', read_only=True)).value
+        self._vehicle_id = fixed(self, 'vehicle', 'av0', 'id of the AV that perceives')
         self._code = TrustedCode(self)
         endpoints = Endpoints(self)
         self._documents = ScenarioDocuments(endpoints)
