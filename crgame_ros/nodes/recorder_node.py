@@ -17,6 +17,7 @@ from crgame_ros.recording.exceptions import RecordingError
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import BAG, next_part, run_folder
+from crgame_ros.recording.standard_messages import standard_types
 from crgame_ros.recording.writer import BagWriter, LogClock
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription, relative
 from crgame_ros.ros.heard_topics import OFFSET, RECORDED
@@ -70,6 +71,8 @@ class RecorderNode(Node):
         self._directory = Path(fixed(
             self, 'directory', BAG, 'folder of the bag; those of later runs have its name and '
             'are in run_2, run_3, … beside it'))
+        # It takes a quarter of a second: now, while other nodes start, not at the first message.
+        standard_types()
         self._endpoints = Endpoints(self)
         self._topics: dict[str, RecordedTopic] = {}
         self._writer: BagWriter | None = None
