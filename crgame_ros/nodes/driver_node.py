@@ -35,7 +35,7 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import String
 
 if TYPE_CHECKING:
-    from crgame_ros.ros.live_policy import PolicyWorld
+    from crgame_ros.ros.world_follower import WorldFollower
 
 DEVICE_POLL_S = 0.02
 
@@ -69,7 +69,7 @@ class DriverNode(PromptNode):
         self._force = LiveForce(endpoints, self._vehicle_id, lambda: not self._silent,
                                 self.get_logger().warning)
         self._lock = threading.Lock()
-        self._world: PolicyWorld | None = None
+        self._world: WorldFollower | None = None
         self._driver: DriverSource | None = None
         self._game: GameDocument | None = None
         self._cycle = -1
@@ -131,11 +131,11 @@ class DriverNode(PromptNode):
             self._joy_subscription = self._endpoints.subscription(
                 '/<hv>/joy', self._on_joy, self._vehicle_id)
 
-    def _policy_world(self) -> 'PolicyWorld':
+    def _policy_world(self) -> 'WorldFollower':
         """Return the world of a policy; subscribe to it once, only where a policy drives."""
         if self._world is None:
-            from crgame_ros.ros.live_policy import PolicyWorld
-            self._world = PolicyWorld(self._endpoints)
+            from crgame_ros.ros.world_follower import WorldFollower
+            self._world = WorldFollower(self._endpoints, '/vehicles/state')
         return self._world
 
     def _on_seats(self, message: String) -> None:
