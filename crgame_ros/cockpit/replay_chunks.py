@@ -103,7 +103,7 @@ class ChunkBuilder:
             if topic in self._scans:
                 yield from self._carried_scans(topic, log_ns, low)
                 continue
-            for message in self._reader.decoded([topic], log_ns, log_ns + 1):
+            for message in self._reader.readable([topic], log_ns, log_ns + 1):
                 if topic == OCCUPANCY_TOPIC \
                         or self._index.run.holds(stamp_of(message.message), log_ns):
                     for frame in self._frames_of(message, low):
@@ -112,8 +112,8 @@ class ChunkBuilder:
     def _carried_scans(self, topic: str, last_ns: int, low: int) -> Iterator[_Entry]:
         """Yield the last scan of each sensor of a topic, which the sensors share."""
         newest: dict[str, bytes] = {}
-        for message in self._reader.decoded([VEHICLES_TOPIC, topic], last_ns - CARRIED_NS,
-                                            last_ns + 1):
+        for message in self._reader.readable([VEHICLES_TOPIC, topic], last_ns - CARRIED_NS,
+                                             last_ns + 1):
             content = message.message
             if not self._index.run.holds(stamp_of(content), message.log_time_ns):
                 continue
@@ -144,7 +144,7 @@ class ChunkBuilder:
         commands: dict[int, FloatArray] = {}
         newest = self._step_before(low)
         run, scheduler = self._index.run, self._scheduler
-        for message in self._reader.decoded(self._index.places, from_ns, to_ns + 1):
+        for message in self._reader.readable(self._index.places, from_ns, to_ns + 1):
             topic, _, log_ns, content = message
             if topic == CYCLE_TOPIC:
                 self._read_commands(content, commands)
@@ -183,10 +183,13 @@ class ChunkBuilder:
         return int(steps[place - 1]) if place else -1
 
     def _read_commands(self, content: Any, commands: dict[int, FloatArray]) -> None:
-        """Read the commands that each vehicle consumed, by step: (V, 4)."""
+        """Read the commands that each vehicle consumed, by step: (V, 4); none if malformed."""
         if len(content.layout.dim) != 2:
             return
-        table = CycleTable.from_message(content.layout.dim[1].label, content.data)
+        try:
+            table = CycleTable.from_message(content.layout.dim[1].label, content.data)
+        except InputError:
+            return
         if table.is_of(self._epoch):
             commands.update(zip(table.column('n').astype(int).tolist(),
                                 table.commands_of(self._vehicles), strict=True))

@@ -40,7 +40,7 @@ _BROWSERS = (('Firefox/', 'Firefox'), ('Edg/', 'Edge'), ('OPR/', 'Opera'),
              ('Chromium/', 'Chromium'), ('Chrome/', 'Chrome'), ('Version/', 'Safari'))
 ACCESS = web.AppKey('access', Access)
 # How long a browser keeps its cookie [s].
-COOKIE_S = 12 * 3600
+_COOKIE_S = 12 * 3600
 _POLICY = 'Content-Security-Policy'
 _FRAMED_BY = 'frame-ancestors'
 _HEADERS = {
@@ -327,17 +327,8 @@ async def _answer(access: Access, request: web.Request,
     name = cookie_name(sockname[1], access.tls is not None)
     cookie = request.cookies.get(name)
     if access.asks and request.path == '/' and 'token' in request.query:
-        try:
-            cookie = access.exchange(request.query['token'], cookie)
-        except InputError as error:
-            return web.Response(status=403, text=f'{error}\n')
-        except CrgameError as error:
-            return web.Response(status=500, text=f'{without_paths(str(error))}\n')
-        rest = request.url.without_query_params('token').relative()
-        answer = web.Response(status=303, headers={'Location': str(rest)})
-        answer.set_cookie(name, cookie, httponly=True, samesite='Strict',
-                          secure=access.tls is not None, max_age=COOKIE_S)
-        return answer
+        return enter(request, access.exchange, name,
+                     str(request.url.without_query_params('token').relative()))
     rights = access.rights(cookie)
     if rights is None and also(request):
         rights = ALL_RIGHTS
@@ -345,6 +336,28 @@ async def _answer(access: Access, request: web.Request,
         return web.Response(status=403, text=f'{access.refusal}\n')
     request[RIGHTS] = rights
     return await handler(request)
+
+
+def enter(request: web.Request, exchange: Callable[[str, str | None], str], name: str, to: str,
+          refusal: str = '') -> web.Response:
+    """
+    Exchange the token of an address for a cookie, and return the answer.
+
+    :param exchange: returns the cookie for a token and the browser's cookie.
+    :param name: of the cookie.
+    :param to: the address of the page.
+    :param refusal: what a browser is told that is not admitted; empty for what `exchange` says.
+    """
+    try:
+        cookie = exchange(request.query['token'], request.cookies.get(name))
+    except InputError as error:
+        return web.Response(status=403, text=f'{refusal or error}\n')
+    except CrgameError as error:
+        return web.Response(status=500, text=f'{without_paths(str(error))}\n')
+    answer = web.Response(status=303, headers={'Location': to})
+    answer.set_cookie(name, cookie, httponly=True, samesite='Strict',
+                      secure=request.app[ACCESS].tls is not None, max_age=_COOKIE_S)
+    return answer
 
 
 def _begun_here(request: web.Request) -> web.Response:

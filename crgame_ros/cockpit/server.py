@@ -13,11 +13,11 @@ import socket
 import time
 from typing import cast
 
-from aiohttp import web, WSCloseCode, WSMsgType
+from aiohttp import web, WSCloseCode
 from crgame_ros.cockpit import library_routes, page_files
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.backend import Backend, ReplayControls
-from crgame_ros.cockpit.client import Client, TokenBucket
+from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.page_files import PageFile
@@ -28,6 +28,7 @@ from crgame_ros.cockpit.page_messages import (
     MAX_BYTES,
     Name,
     Order,
+    PageMessage,
     parse_message,
     Person,
     Ping,
@@ -38,6 +39,7 @@ from crgame_ros.cockpit.page_messages import (
     TaskDone,
     ViewTold,
 )
+from crgame_ros.cockpit.page_socket import PageSocket
 from crgame_ros.cockpit.request_guard import (
     ACCESS,
     actor,
@@ -57,11 +59,7 @@ from crgame_ros.game.documents import VEHICLE_ID
 
 MESSAGES_PER_S = 400.0
 MESSAGE_BURST = 800.0
-MAX_MALFORMED = 5
 MAX_REQUESTS = 16
-# A ping after 5 s of silence, 2.5 s for its answer.
-HEARTBEAT_S = 5.0
-CLOSE_S = 0.4
 # Most bytes unsent in the kernel: more would be seconds of old frames on a slow network.
 _KERNEL_UNSENT = 64 * 1024
 
@@ -222,7 +220,7 @@ async def _check_stalls(hub: Hub) -> None:
         hub.check_stalls(loop.time())
 
 
-class Session:
+class Session(PageSocket[PageMessage]):
     """
     A connection that reads a client's messages and reports its end to the backend.
 
@@ -231,17 +229,12 @@ class Session:
     """
 
     def __init__(self, hub: Hub, backend: Backend) -> None:
+        # The backend comes before the answer to a close.
+        super().__init__(MAX_BYTES, MESSAGES_PER_S, MESSAGE_BURST, autoclose=False,
+                         writer_limit=0)
         self._hub = hub
         self._backend = backend
-        # One byte more: aiohttp refuses a message of exactly this size. This class answers pings,
-        # because they count as messages, and closes, because the backend comes first.
-        self.socket = web.WebSocketResponse(
-            timeout=CLOSE_S, heartbeat=HEARTBEAT_S, compress=False, autoping=False,
-            autoclose=False, max_msg_size=MAX_BYTES + 1, writer_limit=0)
-        self._bucket = TokenBucket(MESSAGES_PER_S, MESSAGE_BURST)
         self._requests: asyncio.Queue[Order | None] = asyncio.Queue(MAX_REQUESTS)
-        self._malformed = 0
-        self._transport: asyncio.WriteTransport | None = None
         self._worker: asyncio.Task[None] | None = None
 
     async def run(self, request: web.Request) -> web.WebSocketResponse:
@@ -250,11 +243,9 @@ class Session:
 
         :param request: the upgrade request.
         """
-        await self.socket.prepare(request)
-        transport = request.transport
-        if not isinstance(transport, asyncio.WriteTransport):
+        transport = await self.prepare(request)
+        if transport is None:
             return self.socket
-        self._transport = transport
         _send_promptly(transport)
         peer = transport.get_extra_info('peername')
         address = str(peer[0]) if peer else ''
@@ -265,22 +256,8 @@ class Session:
         client = self._hub.add(transport.abort, transport.get_write_buffer_size,
                                rights=granted(request), address=address, now_s=now_s)
         client.browser = browser_of(request)
-        writer = asyncio.create_task(client.write(self.socket))
-        writer.add_done_callback(lambda task: _end_with(task, client))
         self._worker = asyncio.create_task(self._work(client))
-        code: int = WSCloseCode.INTERNAL_ERROR
-        reason = ''
-        try:
-            self._backend.joined(client)
-            code, reason = await self._read(client)
-        finally:
-            # Before any await: the client may hold a seat.
-            self._leave(client)
-            writer.cancel()
-            self._requests.put_nowait(None)
-            if reason or client.dropped:
-                _log.info('%s was dropped: %s', client.id, reason or client.dropped)
-            await self.close(code, reason)
+        await self.serve(client)
         # A started request is finished even if its page has gone.
         await asyncio.wait([self._worker])
         return self.socket
@@ -291,19 +268,12 @@ class Session:
         if self._worker is not None:
             self._worker.cancel()
 
-    async def close(self, code: int, reason: str) -> None:
-        """
-        Close the connection within a second, whatever the client does.
+    def joined(self, client: Client) -> None:
+        """Report the client to the backend."""
+        self._backend.joined(client)
 
-        :param reason: readable reason of at most 123 bytes.
-        """
-        with contextlib.suppress(TimeoutError, ConnectionError):
-            async with asyncio.timeout(2 * CLOSE_S):
-                await self.socket.close(code=code, message=reason.encode()[:123])
-        if self._transport is not None:
-            self._transport.abort()
-
-    def _leave(self, client: Client) -> None:
+    def left(self, client: Client) -> None:
+        """Report the client's end to the backend, and end its requests."""
         while not self._requests.empty():
             self._requests.get_nowait()
         self._hub.remove(client)
@@ -311,37 +281,18 @@ class Session:
             self._backend.left(client)
         except Exception:
             _log.exception('end of %s', client.id)
+        self._requests.put_nowait(None)
 
-    async def _read(self, client: Client) -> tuple[int, str]:
-        """Read messages until the connection ends; return the code and reason of the close."""
-        loop = asyncio.get_running_loop()
-        while True:
-            message = await self.socket.receive()
-            if message.type in (WSMsgType.CLOSE, WSMsgType.CLOSING, WSMsgType.CLOSED,
-                                WSMsgType.ERROR):
-                return WSCloseCode.OK, ''
-            now_s = loop.time()
-            if not self._bucket.try_spend(now_s):
-                return (WSCloseCode.POLICY_VIOLATION,
-                        f'more than {MESSAGES_PER_S:g} messages a second')
-            if message.type is WSMsgType.PING:
-                await self.socket.pong(message.data)
-            elif message.type is WSMsgType.TEXT:
-                # A browser answers pings even if its page does nothing any more.
-                client.heard_s = now_s
-                await self._handle(client, message.data)
-            elif message.type is WSMsgType.BINARY:
-                self._blame(client, InputError('is binary', 'message'))
-            if self._malformed >= MAX_MALFORMED:
-                return (WSCloseCode.POLICY_VIOLATION,
-                        f'{MAX_MALFORMED} messages that cannot be read')
+    def parse(self, text: str) -> PageMessage:
+        """Return the message in a text."""
+        return parse_message(text)
 
-    async def _handle(self, client: Client, text: str) -> None:
-        try:
-            message = parse_message(text)
-        except InputError as error:
-            self._blame(client, error)
-            return
+    def tell(self, client: Client, error: InputError) -> None:
+        """Show on the page why its message cannot be read."""
+        self._hub.send_event('notice', {'level': 'error', 'text': str(error)}, only=client)
+
+    async def act(self, client: Client, message: PageMessage) -> None:
+        """Do what a message asks for, or leave it to the worker."""
         refusal = client.rights.refusal(message.type, getattr(message, 'action', ''))
         match message:
             case _ if refusal and self._backend.mode == 'live':
@@ -389,10 +340,6 @@ class Session:
         # Let the task start before the next message is read.
         await asyncio.sleep(0)
 
-    def _blame(self, client: Client, error: InputError) -> None:
-        self._malformed += 1
-        self._hub.send_event('notice', {'level': 'error', 'text': str(error)}, only=client)
-
     async def _work(self, client: Client) -> None:
         while (message := await self._requests.get()) is not None:
             try:
@@ -407,15 +354,6 @@ class Session:
 
     def _reply(self, client: Client, message: Request, ok: bool, text: str) -> None:
         self._hub.send_event('reply', {'to': message.id, 'ok': ok, 'text': text}, only=client)
-
-
-def _end_with(writer: asyncio.Task[None], client: Client) -> None:
-    """Drop a client to which nothing can be sent any more."""
-    error = None if writer.cancelled() else writer.exception()
-    if error is not None and not isinstance(error, ConnectionError):
-        _log.error('cannot send to %s', client.id, exc_info=error)
-    if error is not None:
-        client.drop('cannot be sent to')
 
 
 def _send_promptly(transport: asyncio.WriteTransport) -> None:

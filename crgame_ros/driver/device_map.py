@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Device maps: axes, buttons and keys that drive the vehicle, and limits of a wheel's motor."""
 
-from collections.abc import Set
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -10,7 +10,7 @@ import re
 from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.driver.keyboard import KeyState
-from crgame_ros.driver.wheel import AxisBinding, ControlBindings, GearButtons, LightButtons
+from crgame_ros.driver.wheel import AxisRange, ControlLayout, GearButtons, LightButtons
 from crgame_ros.errors import InputError
 from crgame_ros.paths import config_directory
 from crgame_ros.schema.declaration import Form
@@ -74,6 +74,7 @@ REMEDY = 'see docs/driving.md, section "Add a device"'
 _FORM = Form(REMEDY)
 Index = Annotated[int, Within(0, 999)]
 Finite = Annotated[float, Within()]
+Way = Literal['evdev', 'joy']
 _PEDALS = ('throttle', 'pedals')
 _AXES = OnlyWith(_PEDALS, needed=True)
 
@@ -110,10 +111,11 @@ Keys = Annotated[tuple[Annotated[int, Code('KEY_')], ...], Listed(1)]
 
 @dataclass(frozen=True, kw_only=True)
 class AxisEntry:
-    """An axis; see `AxisBinding`."""
+    """An axis in one way of reading the device; see `EvdevAxis` and `JoyAxis`."""
 
     FORM: ClassVar[Form] = _FORM
 
+    axis: int
     min: Finite | None = None  # noqa: A003
     max: Finite | None = None  # noqa: A003
     rest: Finite | None = None
@@ -128,9 +130,38 @@ class AxisEntry:
                 and (self.max is None or self.rest <= self.max)):
             raise InputError(f'"rest" is {self.rest:g}', '', 'let it lie between min and max')
 
-    def binding(self, axis: int, centred: bool, deadzone: float) -> AxisBinding:
-        """Return the binding of the axis."""
-        return AxisBinding(axis, self.min, self.max, self.rest, self.inverted, centred, deadzone)
+    def range(self, centred: bool, deadzone: float,  # noqa: A003
+              reported: tuple[float, float] | None = None) -> AxisRange:
+        """
+        Complete the range with the values that the device reports.
+
+        :param centred: whether it rests in the middle (steering, combined pedals).
+        :param deadzone: share of the travel that counts as rest.
+        :param reported: the device's own minimum and maximum, if it reports them.
+        :raises InputError: if the map does not fit this device: neither gives a limit, or the map
+            covers less than half of the reported range or exceeds it.
+        """
+        lower, upper = reported or (self.min, self.max)
+        minimum = lower if self.min is None else self.min
+        maximum = upper if self.max is None else self.max
+        if minimum is None or maximum is None or not minimum < maximum:
+            raise InputError(f'axis {self.axis} has the range {minimum} to {maximum}', '',
+                             'state min and max in the device map')
+        if reported is not None and not (
+                reported[0] <= minimum and maximum <= reported[1]
+                and 2.0 * (maximum - minimum) >= reported[1] - reported[0]):
+            raise InputError(f'axis {self.axis} reports {reported[0]:g} to {reported[1]:g}, the '
+                             f'map says {minimum:g} to {maximum:g}', '',
+                             'mend min and max in the device map, or leave them out')
+        rest = self.rest
+        if rest is None and centred:
+            rest = 0.5 * (minimum + maximum)
+        elif rest is None:
+            rest = maximum if self.inverted else minimum
+        if not minimum <= rest <= maximum:
+            raise InputError(f'axis {self.axis} rests at {rest:g}, outside {minimum:g} to '
+                             f'{maximum:g}', '', 'mend rest in the device map')
+        return AxisRange(self.axis, minimum, maximum, rest, self.inverted, deadzone)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,10 +214,11 @@ class AxisPair:
     joy: JoyAxis
     deadzone: Annotated[float, Within(0.0, 0.5)] = 0.0
 
-    def bindings(self, centred: bool) -> tuple[AxisBinding, AxisBinding]:
-        """Return the bindings for evdev and joy."""
-        return (self.evdev.binding(self.evdev.axis, centred, self.deadzone),
-                self.joy.binding(self.joy.axis, centred, self.deadzone))
+    def range(self, way: Way, centred: bool,  # noqa: A003
+              reported: Mapping[int, tuple[float, float]]) -> AxisRange:
+        """Return the range for one way of reading the device; see `AxisEntry.range`."""
+        entry = self.evdev if way == 'evdev' else self.joy
+        return entry.range(centred, self.deadzone, reported.get(entry.axis))
 
 
 @dataclass(frozen=True)
@@ -232,18 +264,18 @@ class ButtonEntry:
     horn: tuple[ButtonPair, ...] = ()
     put_back: tuple[ButtonPair, ...] = ()
 
-    def gears(self, way: Literal['evdev', 'joy']) -> GearButtons:
+    def gears(self, way: Way) -> GearButtons:
         """Return the gear buttons for one way of reading the device."""
         return GearButtons(*(_codes(pairs, way) for pairs in (
             self.reverse_on, self.reverse_off, self.reverse_toggle, self.reverse_held)))
 
-    def lights(self, way: Literal['evdev', 'joy']) -> LightButtons:
+    def lights(self, way: Way) -> LightButtons:
         """Return the buttons of indicators and horn for one way of reading the device."""
         return LightButtons(*(_codes(pairs, way) for pairs in (
             self.left_indicator, self.right_indicator, self.hazard, self.horn)))
 
 
-def _codes(pairs: tuple[ButtonPair, ...], way: str) -> frozenset[int]:
+def _codes(pairs: tuple[ButtonPair, ...], way: Way) -> frozenset[int]:
     return frozenset(getattr(pair, way) for pair in pairs)
 
 
@@ -342,21 +374,24 @@ class DeviceFile:
                 raise InputError(f'"match": {pattern!r:.80} is no regular expression: {error}', '',
                                  'mend it') from error
 
-    def controls(self) -> tuple[ControlBindings, ControlBindings] | None:
-        """Return the control bindings for evdev and joy; None for a keyboard."""
-        if self.steering is None or self.buttons is None:
-            return None
-        none = (None, None)
-        steering = self.steering.bindings(True)
-        throttle = none if self.throttle is None else self.throttle.bindings(False)
-        brake = none if self.brake is None else self.brake.bindings(False)
-        pedals = none if self.pedals is None else self.pedals.bindings(True)
-        return (ControlBindings(steering[0], throttle[0], brake[0], pedals[0],
-                                self.buttons.gears('evdev'), self.buttons.lights('evdev'),
-                                _codes(self.buttons.put_back, 'evdev')),
-                ControlBindings(steering[1], throttle[1], brake[1], pedals[1],
-                                self.buttons.gears('joy'), self.buttons.lights('joy'),
-                                _codes(self.buttons.put_back, 'joy')))
+    def layout(self, way: Way, reported: Mapping[int, tuple[float, float]] | None = None
+               ) -> ControlLayout:
+        """
+        Return the calibrated controls of a wheel or gamepad, for one way of reading it.
+
+        :param reported: minimum and maximum by axis code, as the device reports them.
+        :raises InputError: if the map does not fit the device.
+        """
+        known = reported or {}
+
+        def complete(pair: AxisPair | None, centred: bool = False) -> AxisRange | None:
+            return None if pair is None else pair.range(way, centred, known)
+
+        assert self.steering is not None and self.buttons is not None
+        return ControlLayout(
+            self.steering.range(way, True, known), complete(self.throttle),
+            complete(self.brake), complete(self.pedals, True), self.buttons.gears(way),
+            self.buttons.lights(way), _codes(self.buttons.put_back, way))
 
 
 class DeviceKind(IntEnum):
@@ -373,23 +408,26 @@ class DeviceMap:
     One file of `config/devices/`.
 
     :param name: the file's name without its ending.
-    :param title: one line for people.
-    :param kind: wheel, gamepad or keyboard.
-    :param patterns: regular expressions; one of them is found in the device's name.
-    :param evdev: controls when read through evdev; None for a keyboard.
-    :param joy: controls when read from a `joy` node; None for a keyboard.
-    :param keys: keys of a keyboard, as evdev codes; None otherwise.
-    :param force: the motor of a wheel; None where there is none, or it is not to be used.
+    :param file: its content.
     """
 
     name: str
-    title: str
-    kind: DeviceKind
-    patterns: tuple[str, ...]
-    evdev: ControlBindings | None = None
-    joy: ControlBindings | None = None
-    keys: KeyEntry | None = None
-    force: ForceLimits | None = None
+    file: DeviceFile
+
+    @property
+    def kind(self) -> DeviceKind:
+        """Return whether it is a wheel, a gamepad or a keyboard."""
+        return DeviceKind[self.file.kind.upper()]
+
+    @property
+    def keys(self) -> KeyEntry | None:
+        """Return the keys of a keyboard, as evdev codes; None otherwise."""
+        return self.file.keys
+
+    @property
+    def force(self) -> ForceLimits | None:
+        """Return the motor of a wheel; None where there is none, or it is not to be used."""
+        return self.file.force_feedback
 
     def fits(self, name: str, axes: frozenset[int], buttons: frozenset[int]) -> bool:
         """
@@ -399,13 +437,12 @@ class DeviceMap:
         :param axes: its evdev axis codes.
         :param buttons: its evdev key and button codes.
         """
-        if not any(re.search(pattern, name) for pattern in self.patterns):
+        if not any(re.search(pattern, name) for pattern in self.file.match):
             return False
         if self.keys is not None:
             return self.keys.codes <= buttons
-        assert self.evdev is not None
-        bound = (self.evdev.steering, self.evdev.throttle, self.evdev.brake, self.evdev.pedals)
-        if not {axis.code for axis in bound if axis is not None} <= axes:
+        bound = (self.file.steering, self.file.throttle, self.file.brake, self.file.pedals)
+        if not {pair.evdev.axis for pair in bound if pair is not None} <= axes:
             return False
         return self.kind is not DeviceKind.GAMEPAD or ecodes.BTN_GAMEPAD in buttons
 
@@ -434,7 +471,4 @@ def load_device_map(name: str) -> DeviceMap:
     if not path.exists():
         known = ', '.join(sorted(known.stem for known in folder.glob('*.yaml')))
         raise InputError('there is no such device map', str(path), f'the maps are {known}')
-    file = read(DeviceFile, read_yaml(path, 'device map', REMEDY), str(path))
-    evdev, joy = file.controls() or (None, None)
-    return DeviceMap(path.stem, file.title, DeviceKind[file.kind.upper()], file.match,
-                     evdev, joy, file.keys, file.force_feedback)
+    return DeviceMap(path.stem, read(DeviceFile, read_yaml(path, 'device map', REMEDY), str(path)))

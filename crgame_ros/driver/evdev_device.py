@@ -276,9 +276,8 @@ class EvdevDevice:
                 gear, self.layout = GearButtons(toggle=frozenset(device_map.keys.reverse)), None
                 lights = device_map.keys.lights
             else:
-                assert device_map.evdev is not None
-                gear, self.layout = device_map.evdev.gear, device_map.evdev.layout(self._limits)
-                lights = device_map.evdev.lights
+                self.layout = device_map.file.layout('evdev', self._limits)
+                gear, lights = self.layout.gear, self.layout.lights
             self.decoder = EventDecoder(gear, self.decoder.reverse, lights)
             self._on_steady_clock = stamp_by_steady_clock(device.fd)
             self._synchronise(device)

@@ -2,13 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """From pressed keys to smooth pedals and steering (CRG equations 18 and 19)."""
 
-from dataclasses import dataclass, fields
 import math
 from typing import NamedTuple
 
-from crgame_ros.errors import InputError
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from crgame_ros.vehicle.lights import lights_of
+
+# CRG III-C1 [1/s]: the rates of a held pedal key (r_th+, r_br+), of either pedal otherwise (r_p-),
+# of a held steering key (r_s+), and back to the centre (r_s-).
+THROTTLE_RATE, BRAKE_RATE, PEDAL_RELEASE_RATE = 1.8, 2.5, 2.2
+STEERING_RATE, STEERING_RELEASE_RATE = 2.0, 3.5
+# s_max, the largest steering that a key reaches.
+STEERING_CAP = 0.65
+# Pedals and steering below these count as released and centred.
+PEDAL_DEADBAND, STEERING_DEADBAND = 1e-3, 1e-4
 
 
 class KeyState(NamedTuple):
@@ -43,115 +50,58 @@ class KeyState(NamedTuple):
         return lights_of(self.left_indicator, self.right_indicator, self.horn)
 
 
-@dataclass(frozen=True)
-class KeyboardParameters:
+def advanced(state: DriverCommand, keys: KeyState, dt_s: float) -> DriverCommand:
     """
-    Rates, cap and deadbands of the keyboard filter; the defaults are those of CRG III-C1.
+    Return the state after one cycle: CRG 18 for the pedals, CRG 19 for the steering.
 
-    :param throttle_rate: r_th+, of the throttle while its key is held [1/s].
-    :param brake_rate: r_br+, of the brake while its key is held [1/s].
-    :param pedal_release_rate: r_p-, of either pedal otherwise [1/s].
-    :param steering_rate: r_s+, while a steering key is held [1/s].
-    :param steering_release_rate: r_s-, back to the centre otherwise [1/s].
-    :param steering_cap: s_max, the largest steering a key reaches, in (0, 1].
-    :param pedal_deadband: pedals below it count as released.
-    :param steering_deadband: steering below it counts as centred.
+    Braking takes precedence over the throttle: beta_th = b_th (1 - b_br). Both steering keys
+    together hold the steering, because b_L - b_R = 0 in the first case of CRG 19.
+
+    :param state: the state at the start of the cycle, before the deadbands.
+    :param keys: the keys held during the cycle.
+    :param dt_s: length of the cycle in simulation time [s].
     """
-
-    throttle_rate: float = 1.8
-    brake_rate: float = 2.5
-    pedal_release_rate: float = 2.2
-    steering_rate: float = 2.0
-    steering_release_rate: float = 3.5
-    steering_cap: float = 0.65
-    pedal_deadband: float = 1e-3
-    steering_deadband: float = 1e-4
-
-    def __post_init__(self) -> None:
-        """Check that the rates, caps and deadbands are valid."""
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InputError(f'{field.name} is {value!r}', 'keyboard filter',
-                                 'give a finite number of at least 0')
-        if not 0.0 < self.steering_cap <= 1.0:
-            raise InputError(f'steering_cap is {self.steering_cap!r}', 'keyboard filter',
-                             'give a number above 0 and at most 1')
+    throttle_rate = THROTTLE_RATE if keys.throttle and not keys.brake else -PEDAL_RELEASE_RATE
+    brake_rate = BRAKE_RATE if keys.brake else -PEDAL_RELEASE_RATE
+    if keys.left or keys.right:
+        steering = state.steering + STEERING_RATE * (keys.left - keys.right) * dt_s
+        steering = min(STEERING_CAP, max(-STEERING_CAP, steering))
+    else:
+        steering = math.copysign(
+            max(0.0, abs(state.steering) - STEERING_RELEASE_RATE * dt_s), state.steering)
+    return DriverCommand(
+        min(1.0, max(0.0, state.throttle + throttle_rate * dt_s)),
+        min(1.0, max(0.0, state.brake + brake_rate * dt_s)),
+        steering, bool(keys.reverse), keys.lights, bool(keys.put_back))
 
 
-class KeyboardFilter:
+def command_of(state: DriverCommand) -> DriverCommand:
     """
-    The rate-limited integration of CRG 18-19, in simulation time.
+    Apply the deadbands of CRG III-C1 to a state.
 
-    The state is a `DriverCommand` before the deadbands; `advance` commits a cycle,
-    `preview` returns the result of a cycle without committing it, and `advanced` is the
-    pure step behind both.
+    They act on the output alone: in the state they would stop a filter for ever if its step is
+    shorter than deadband / rate.
     """
-
-    def __init__(self, parameters: KeyboardParameters | None = None) -> None:
-        self.parameters = parameters or KeyboardParameters()
-        self.state = RELEASED
-
-    def advanced(self, state: DriverCommand, keys: KeyState, dt_s: float) -> DriverCommand:
-        """
-        Return the state after one cycle: CRG 18 for the pedals, CRG 19 for the steering.
-
-        Braking takes precedence over the throttle: beta_th = b_th (1 - b_br). Both steering keys
-        together hold the steering, because b_L - b_R = 0 in the first case of CRG 19.
-
-        :param state: the state at the start of the cycle, before the deadbands.
-        :param keys: the keys held during the cycle.
-        :param dt_s: length of the cycle in simulation time [s].
-        """
-        p = self.parameters
-        throttle_rate = p.throttle_rate if keys.throttle and not keys.brake \
-            else -p.pedal_release_rate
-        brake_rate = p.brake_rate if keys.brake else -p.pedal_release_rate
-        if keys.left or keys.right:
-            steering = state.steering + p.steering_rate * (keys.left - keys.right) * dt_s
-            steering = min(p.steering_cap, max(-p.steering_cap, steering))
-        else:
-            steering = math.copysign(
-                max(0.0, abs(state.steering) - p.steering_release_rate * dt_s), state.steering)
-        return DriverCommand(
-            min(1.0, max(0.0, state.throttle + throttle_rate * dt_s)),
-            min(1.0, max(0.0, state.brake + brake_rate * dt_s)),
-            steering, bool(keys.reverse), keys.lights, bool(keys.put_back))
-
-    def command(self, state: DriverCommand) -> DriverCommand:
-        """
-        Apply the deadbands of CRG III-C1 to a state.
-
-        They act on the output alone: in the state they would stop a filter for ever if its step is
-        shorter than deadband / rate.
-        """
-        p = self.parameters
-        return DriverCommand(
-            0.0 if state.throttle < p.pedal_deadband else state.throttle,
-            0.0 if state.brake < p.pedal_deadband else state.brake,
-            0.0 if abs(state.steering) < p.steering_deadband else state.steering,
-            state.reverse, state.lights, state.put_back)
+    return DriverCommand(
+        0.0 if state.throttle < PEDAL_DEADBAND else state.throttle,
+        0.0 if state.brake < PEDAL_DEADBAND else state.brake,
+        0.0 if abs(state.steering) < STEERING_DEADBAND else state.steering,
+        state.reverse, state.lights, state.put_back)
 
 
 class KeyboardCycles:
-    """
-    The keyboard filter cycle by cycle; the present cycle may be computed again.
+    """The keyboard filter cycle by cycle; the present cycle may be computed again."""
 
-    :param parameters: of the filter; None means the paper's.
-    """
-
-    def __init__(self, parameters: KeyboardParameters | None = None) -> None:
-        self._parameters = parameters
+    def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
         """Reset to the time before the first cycle, released."""
-        self._filter = KeyboardFilter(self._parameters)
         self.cycle = -1
         self._keys = KeyState()
         self._dt_s = 0.0
-        # The filter's state after the present cycle.
-        self._coming = self._filter.state
+        # The filter's state before and after the present cycle.
+        self._state = self._coming = RELEASED
 
     def command(self, n: int, keys: KeyState, dt_s: float) -> DriverCommand:
         """
@@ -164,9 +114,9 @@ class KeyboardCycles:
         if n > self.cycle:
             # The ramps of CRG 18-19 are clipped lines, so several cycles equal one longer cycle.
             gap = n - self.cycle if self.cycle >= 0 else 0
-            self._filter.state = self._coming if gap == 1 else self._filter.advanced(
-                self._filter.state, self._keys, gap * self._dt_s)
+            self._state = self._coming if gap == 1 else advanced(
+                self._state, self._keys, gap * self._dt_s)
             self.cycle = n
         self._keys, self._dt_s = keys, dt_s
-        self._coming = self._filter.advanced(self._filter.state, keys, dt_s)
-        return self._filter.command(self._coming)
+        self._coming = advanced(self._state, keys, dt_s)
+        return command_of(self._coming)

@@ -9,7 +9,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from crgame_ros.driver.keyboard import KeyboardCycles, KeyboardParameters
+from crgame_ros.driver.keyboard import KeyboardCycles
 from crgame_ros.driver.timeline import (
     JoyTimeline,
     KeyTimeline,
@@ -192,12 +192,11 @@ class ScriptedDriver(DriverSource):
     joins at a later cycle first computes all earlier ones.
 
     :param timeline: of keys or of axes.
-    :param parameters: of the keyboard filter; None takes the paper's.
     """
 
-    def __init__(self, timeline: Timeline, parameters: KeyboardParameters | None = None) -> None:
+    def __init__(self, timeline: Timeline) -> None:
         self.timeline = timeline
-        self._cycles = KeyboardCycles(parameters)
+        self._cycles = KeyboardCycles()
         self._time_s = 0.0
 
     @classmethod
@@ -242,18 +241,15 @@ class JoyDriver(DriverSource):
     The messages of an external `joy` node, normalised by a device map (CRG 17).
 
     :param device_map: of a wheel or gamepad.
-    :param timeout_s: silence after which the node counts as gone [s]; by default a `joy` node
-        repeats its message at 20 Hz.
     :raises InputError: if the map is a keyboard's.
     """
 
-    def __init__(self, device_map: 'DeviceMap', timeout_s: float = JOY_TIMEOUT_S) -> None:
-        if device_map.joy is None:
+    def __init__(self, device_map: 'DeviceMap') -> None:
+        if device_map.keys is not None:
             raise InputError('is a keyboard, which has no joy node', device_map.name,
                              'choose the map of a wheel or gamepad')
-        self._layout = device_map.joy.layout()
+        self._layout = device_map.file.layout('joy')
         self.name = device_map.name
-        self._timeout_s = timeout_s
         self._heard_s = self._now_s = -math.inf
         self._raw = RawInput()
         self._reverse = False
@@ -262,7 +258,7 @@ class JoyDriver(DriverSource):
     @property
     def connected(self) -> bool:
         """Return whether a message came within the timeout and has the axes of the map."""
-        return self.problem is None and self._now_s - self._heard_s <= self._timeout_s
+        return self.problem is None and self._now_s - self._heard_s <= JOY_TIMEOUT_S
 
     def receive(self, axes: Sequence[float], buttons: Sequence[int], now_s: float) -> None:
         """
@@ -304,14 +300,12 @@ class EvdevDriver(DriverSource):
     A device read through evdev: wheels and gamepads by CRG 17, keyboards by CRG 18-19.
 
     :param device: the device, connected or not yet.
-    :param parameters: of the keyboard filter; None takes the paper's.
     """
 
-    def __init__(self, device: 'EvdevDevice', parameters: KeyboardParameters | None = None,
-                 ) -> None:
+    def __init__(self, device: 'EvdevDevice') -> None:
         self.device = device
         self.problem = device.problem
-        self._cycles = KeyboardCycles(parameters)
+        self._cycles = KeyboardCycles()
 
     @property
     def connected(self) -> bool:

@@ -2,50 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command of a seat whose driver is silent: released, then gentle braking to a standstill."""
 
-from dataclasses import dataclass, fields
-import math
-
-from crgame_ros.driver.keyboard import KeyboardParameters
-from crgame_ros.errors import InputError
+from crgame_ros.driver.keyboard import (
+    BRAKE_RATE,
+    PEDAL_RELEASE_RATE,
+    STEERING_RELEASE_RATE,
+    THROTTLE_RATE,
+)
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from crgame_ros.vehicle.lights import HAZARD
 from crgame_ros.vehicle.state import REST
 
-_RATES = KeyboardParameters()
-
-
-@dataclass(frozen=True)
-class WatchdogParameters:
-    """
-    The timeout of a driver, and the parameters of the stop after it.
-
-    :param timeout_s: silence after which a driver counts as lost [s].
-    :param gentle_brake: brake pedal p_br of the stop, in [0, 1].
-    :param throttle_rate: of a rising throttle [1/s]; CRG's r_th+.
-    :param brake_rate: of a rising brake [1/s]; CRG's r_br+.
-    :param pedal_release_rate: of a falling pedal [1/s]; CRG's r_p-.
-    :param steering_release_rate: of the steering in either direction [1/s]; CRG's r_s-.
-    :param standstill_speed: |v| below which the vehicle stands [m/s].
-    """
-
-    timeout_s: float = 0.2
-    gentle_brake: float = 0.15
-    throttle_rate: float = _RATES.throttle_rate
-    brake_rate: float = _RATES.brake_rate
-    pedal_release_rate: float = _RATES.pedal_release_rate
-    steering_release_rate: float = _RATES.steering_release_rate
-    standstill_speed: float = REST
-
-    def __post_init__(self) -> None:
-        """Check that the values bring a vehicle to a stop."""
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise InputError(f'{field.name} is {value!r}', 'seat watchdog',
-                                 'give a finite number above 0')
-        if self.gentle_brake > 1.0:
-            raise InputError(f'gentle_brake is {self.gentle_brake!r}', 'seat watchdog',
-                             'give at most 1')
+# Silence after which a driver counts as lost [s].
+TIMEOUT_S = 0.2
+# The brake pedal p_br of the stop.
+GENTLE_BRAKE = 0.15
 
 
 class SeatWatchdog:
@@ -59,8 +29,7 @@ class SeatWatchdog:
     at the same rates, and passes them on as soon as it has reached them.
     """
 
-    def __init__(self, parameters: WatchdogParameters | None = None) -> None:
-        self.parameters = parameters or WatchdogParameters()
+    def __init__(self) -> None:
         self.losses = 0
         self.reset()
 
@@ -81,7 +50,7 @@ class SeatWatchdog:
         :param dt_s: length of the step in simulation time [s].
         :param speed: signed speed of the vehicle [m/s].
         """
-        silent = not age_s <= self.parameters.timeout_s
+        silent = not age_s <= TIMEOUT_S
         if silent and not self.lost:
             self.losses += 1
         self._returning = not silent and (self.lost or self._returning)
@@ -97,23 +66,21 @@ class SeatWatchdog:
 
     def _stopping(self, speed: float) -> DriverCommand:
         now = self._output
-        gentle = self.parameters.gentle_brake
-        if abs(speed) < self.parameters.standstill_speed:
+        if abs(speed) < REST:
             brake = 0.0
-        elif now.brake > gentle or (now.throttle == 0.0 and now.steering == 0.0):
-            brake = gentle
+        elif now.brake > GENTLE_BRAKE or (now.throttle == 0.0 and now.steering == 0.0):
+            brake = GENTLE_BRAKE
         else:
             brake = now.brake
         return DriverCommand(0.0, brake, 0.0, now.reverse, now.lights & HAZARD)
 
     def _towards(self, goal: DriverCommand, dt_s: float) -> DriverCommand:
-        p = self.parameters
         now = self._output
-        release = p.pedal_release_rate * dt_s
-        turn = p.steering_release_rate * dt_s
+        release = PEDAL_RELEASE_RATE * dt_s
+        turn = STEERING_RELEASE_RATE * dt_s
         return DriverCommand(
-            _ramp(now.throttle, goal.throttle, p.throttle_rate * dt_s, release),
-            _ramp(now.brake, goal.brake, p.brake_rate * dt_s, release),
+            _ramp(now.throttle, goal.throttle, THROTTLE_RATE * dt_s, release),
+            _ramp(now.brake, goal.brake, BRAKE_RATE * dt_s, release),
             _ramp(now.steering, goal.steering, turn, turn), goal.reverse, goal.lights,
             goal.put_back)
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 import math
 from typing import NamedTuple
 
-from crgame_ros.errors import InputError
 from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.lights import HAZARD, Light
 
@@ -220,89 +219,6 @@ class ControlLayout:
         """Return every axis in use."""
         axes = (self.steering, self.throttle, self.brake, self.pedals)
         return tuple(axis for axis in axes if axis is not None)
-
-
-@dataclass(frozen=True)
-class AxisBinding:
-    """
-    One axis as given in a device map, for evdev or for the `joy` node.
-
-    :param code: evdev code, or index in `Joy.axes`.
-    :param minimum: smallest raw value; None means as the device reports.
-    :param maximum: largest raw value; None likewise.
-    :param rest: raw value at rest; None is the middle for steering and combined pedals, and
-        the minimum (inverted: the maximum) for a pedal.
-    :param inverted: the command falls as the raw value rises.
-    :param centred: rests in the middle (steering, combined pedals).
-    :param deadzone: share of the travel that counts as rest.
-    """
-
-    code: int
-    minimum: float | None
-    maximum: float | None
-    rest: float | None
-    inverted: bool
-    centred: bool
-    deadzone: float
-
-    def range(self, reported: tuple[float, float] | None = None) -> AxisRange:  # noqa: A003
-        """
-        Complete the range with the values that the device reports.
-
-        :param reported: the device's own minimum and maximum, if it reports them.
-        :raises InputError: if the map does not fit this device: neither gives a limit, or the map
-            covers less than half of the reported range or exceeds it.
-        """
-        lower, upper = reported or (self.minimum, self.maximum)
-        minimum = lower if self.minimum is None else self.minimum
-        maximum = upper if self.maximum is None else self.maximum
-        if minimum is None or maximum is None or not minimum < maximum:
-            raise InputError(f'axis {self.code} has the range {minimum} to {maximum}', '',
-                             'state min and max in the device map')
-        if reported is not None and not (
-                reported[0] <= minimum and maximum <= reported[1]
-                and 2.0 * (maximum - minimum) >= reported[1] - reported[0]):
-            raise InputError(f'axis {self.code} reports {reported[0]:g} to {reported[1]:g}, the '
-                             f'map says {minimum:g} to {maximum:g}', '',
-                             'mend min and max in the device map, or leave them out')
-        rest = self.rest
-        if rest is None and self.centred:
-            rest = 0.5 * (minimum + maximum)
-        elif rest is None:
-            rest = maximum if self.inverted else minimum
-        if not minimum <= rest <= maximum:
-            raise InputError(f'axis {self.code} rests at {rest:g}, outside {minimum:g} to '
-                             f'{maximum:g}', '', 'mend rest in the device map')
-        return AxisRange(self.code, minimum, maximum, rest, self.inverted, self.deadzone)
-
-
-@dataclass(frozen=True)
-class ControlBindings:
-    """The controls of a wheel or gamepad for one way of reading it; None for a missing control."""
-
-    steering: AxisBinding
-    throttle: AxisBinding | None
-    brake: AxisBinding | None
-    pedals: AxisBinding | None
-    gear: GearButtons
-    lights: LightButtons = LightButtons()
-    put_back: frozenset[int] = frozenset()
-
-    def layout(self, reported: Mapping[int, tuple[float, float]] | None = None) -> ControlLayout:
-        """
-        Return the calibrated layout.
-
-        :param reported: minimum and maximum by axis code, as the device reports them.
-        :raises InputError: if the map does not fit the device.
-        """
-        known = reported or {}
-
-        def complete(axis: AxisBinding | None) -> AxisRange | None:
-            return axis.range(known.get(axis.code)) if axis is not None else None
-
-        return ControlLayout(
-            self.steering.range(known.get(self.steering.code)), complete(self.throttle),
-            complete(self.brake), complete(self.pedals), self.gear, self.lights, self.put_back)
 
 
 def reported(axes: Mapping[int, float], layout: ControlLayout,

@@ -13,6 +13,7 @@ from crgame_ros.cockpit.framing_origin import read_origin
 from crgame_ros.errors import InputError
 from crgame_ros.library.lookup import find_scenario, scenario_of
 from crgame_ros.paths import find_game
+from crgame_ros.ros.namespace_lock import read_namespace
 from crgame_ros.timing.time_controller import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 
 DESCRIPTION = """\
@@ -193,7 +194,7 @@ def build_parser(program: str) -> argparse.ArgumentParser:
         'wait only for drivers in the page)')
     add('--realtime-priority', action='store_true',
         help='run the simulation under SCHED_FIFO, if the system allows it')
-    add('--namespace', type=_namespace, default='/', metavar='/NAME',
+    add('--namespace', type=read_namespace, default='/', metavar='/NAME',
         help='put every node, topic and service of this run there, beside other runs in one ROS '
         'domain')
     add('--open-topics', action='store_true',
@@ -291,14 +292,6 @@ def _positive(text: str) -> float:
     if not 0.0 < value < math.inf:
         raise argparse.ArgumentTypeError(f'{text} is not above 0')
     return value
-
-
-def _namespace(text: str) -> str:
-    if text != '/' and not re.fullmatch(
-            r'/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*', text):
-        raise argparse.ArgumentTypeError(
-            f'{text} is no namespace: letters, digits and _ between /')
-    return '/' + text.removeprefix('/')
 
 
 def _origin(text: str) -> str:

@@ -13,8 +13,7 @@ from typing import IO, TYPE_CHECKING
 
 from crgame_ros.launcher.interruption import writing
 from crgame_ros.launcher.run_report import write_run_report
-from crgame_ros.recording.metadata import METADATA_FILE
-from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, run_folders
+from crgame_ros.recording.run_folder import FINISHED_MARK, is_closed, run_folders
 
 if TYPE_CHECKING:  # It takes a second to import.
     from crgame_ros.analysis.runs.run import Run
@@ -57,7 +56,7 @@ class Finisher:
             return
         folders = run_folders(self._session)
         left = [folder for folder in folders if folder not in self._codes]
-        if left and _is_closed(folders[-1]):
+        if left and is_closed(folders[-1]):
             self._start(left[-1])
 
     def finish_all(self, asked_to_end: bool = False) -> int:
@@ -140,9 +139,3 @@ class Finisher:
                 self._say(line.rstrip('\n'))
         self._codes[self._folder] = code
         self._process = None
-
-
-def _is_closed(folder: Path) -> bool:
-    """Return whether the recorder has closed a run's last recording."""
-    bags = bags_of(folder)
-    return bool(bags) and (bags[-1] / METADATA_FILE).is_file()

@@ -147,8 +147,12 @@ class Graph:
             self._start(node.spec)
 
     def _welcome(self) -> None:
-        """Start the nodes of vehicles that have joined with another game."""
+        """Start the nodes that another game needs: new ones, and those that were given up."""
         for spec in self._roster.changed_specs() if self._roster is not None else ():
+            if spec.name in self._given_up:
+                self._given_up.discard(spec.name)
+                self._died_s.pop(spec.name, None)
+                self._forget(self._nodes.pop(spec.name))
             if spec.name not in self._nodes:
                 self._start(spec)
 

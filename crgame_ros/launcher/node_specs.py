@@ -130,13 +130,16 @@ class Roster:
         self._seen: tuple[int, int] | None = None
 
     def changed_specs(self) -> list[NodeSpec]:
-        """Return the nodes that the vehicles need, if the file has changed; else none."""
+        """Return the nodes that the vehicles of another game need; none if it is the same."""
         try:
             stat = self._path.stat()
         except OSError:
             return []
         if (stat.st_mtime_ns, stat.st_ino) == self._seen:
             return []
-        self._seen = (stat.st_mtime_ns, stat.st_ino)
+        first, self._seen = self._seen is None, (stat.st_mtime_ns, stat.st_ino)
+        if first:
+            # The graph begins with its nodes.
+            return []
         content = json.loads(self._path.read_text(encoding='utf-8'))
         return participant_specs(Participants.read(content), self._path)

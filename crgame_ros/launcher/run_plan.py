@@ -29,15 +29,13 @@ from crgame_ros.recording.recorded_game import (
     replay_notices,
     with_replayed_events,
 )
-from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_folder import BAG, CLAIM, GAME_FILE, recording_in
 from crgame_ros.registry import POLICY
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.loading import plays_its_humans
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.game_check import check_swap
 from crgame_ros.simulation.setup import build_setup, Setup
-
-CLAIM = '.started'
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ class RunPlan:
     @property
     def game_file(self) -> Path:
         """Return the file of the resolved game, in the run's folder."""
-        return self.folder / 'game.yaml'
+        return self.folder / GAME_FILE
 
     @property
     def cockpit(self) -> Path:
@@ -87,7 +85,7 @@ class RunPlan:
     @property
     def bag(self) -> Path:
         """Return the path of the recording."""
-        return self.folder / 'bag'
+        return self.folder / BAG
 
 
 def effective_game(request: RunRequest, game: Game | None = None) -> Game:
@@ -313,7 +311,7 @@ def _make_folder(out: Path | None, benchmark_id: str, now: datetime) -> Path:
             if not folder.is_dir():
                 raise NotADirectoryError(ENOTDIR, os.strerror(ENOTDIR))
             with contextlib.suppress(FileExistsError):
-                if not (folder / 'bag').exists():
+                if not (folder / BAG).exists():
                     # Several launchers may start at once: the one that creates this file has the
                     # folder.
                     (folder / CLAIM).touch(exist_ok=False)

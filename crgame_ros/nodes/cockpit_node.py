@@ -16,6 +16,7 @@ from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.nodes.cockpit.backend import LiveBackend
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.number_parameters import fixed
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
@@ -27,53 +28,37 @@ class CockpitNode(Node):
 
     def __init__(self) -> None:
         super().__init__('cockpit_node')
-        declare = self.declare_parameter
         # Removed at the end.
         self._private = ExitStack()
         self._opening = self._declare_exposure()
-        self._framed_by: str = declare('framed_by', '', ParameterDescriptor(
-            description='origins of the only pages that may show this one within them, such as '
-                        'http://127.0.0.1:8070, with spaces between them; empty: no page may',
-            read_only=True)).value
-        self._seats: list[str] = declare('seats', ['hv0'], ParameterDescriptor(
-            description='seats for which open_cockpit makes links', read_only=True)).value
-        self._folders: list[str] = declare('folders', [''], ParameterDescriptor(
-            description="folders of games and scenarios beside the package's own",
-            read_only=True)).value
-        self._runs: str = declare('runs', '', ParameterDescriptor(
-            description="folder of the session's files, which the page names; none if empty",
-            read_only=True)).value
-        self._archive: str = declare('archive', '', ParameterDescriptor(
-            description='folder of other sessions, whose runs the page lists; none if empty',
-            read_only=True)).value
-        self._work: str = declare('directory', 'cockpit', ParameterDescriptor(
-            description='folder for uploaded scenarios and for the games that people choose',
-            read_only=True)).value
+        self._framed_by = fixed(
+            self, 'framed_by', '', 'origins of the only pages that may show this one within them, '
+            'such as http://127.0.0.1:8070, with spaces between them; empty: no page may')
+        self._seats = fixed(self, 'seats', ['hv0'], 'seats for which open_cockpit makes links')
+        self._folders = fixed(self, 'folders', [''],
+                              "folders of games and scenarios beside the package's own")
+        self._runs = fixed(self, 'runs', '',
+                           "folder of the session's files, which the page names; none if empty")
+        self._archive = fixed(self, 'archive', '',
+                              'folder of other sessions, whose runs the page lists; none if empty')
+        self._work = fixed(self, 'directory', 'cockpit', 'folder for uploaded scenarios and for '
+                           'the games that people choose')
 
     def _declare_exposure(self) -> Exposure:
-        declare = self.declare_parameter
-
-        def text(name: str, default: str, what: str) -> str:
-            return str(declare(name, default, ParameterDescriptor(
-                description=what, read_only=True)).value)
-
-        def flag(name: str, what: str) -> bool:
-            return bool(declare(name, False, ParameterDescriptor(
-                description=what, read_only=True)).value)
-
-        port: int = declare('port', 8080, ParameterDescriptor(
+        port: int = self.declare_parameter('port', 8080, ParameterDescriptor(
             description='port of the page; the next free one when it is taken', read_only=True,
             integer_range=[IntegerRange(from_value=1, to_value=65535, step=1)])).value
-        certificate = text('certificate', '', 'PEM file for TLS; plain HTTP if empty')
-        key = text('key', '', 'PEM file with the key of the certificate')
+        certificate = fixed(self, 'certificate', '', 'PEM file for TLS; plain HTTP if empty')
+        key = fixed(self, 'key', '', 'PEM file with the key of the certificate')
         return Exposure(
-            text('listen', '127.0.0.1', 'address to listen on; beyond this machine everybody '
-                 'needs the token of the printed address'), port,
-            flag('token', 'ask for a token on this machine too'),
-            flag('open_cockpit', 'let people in by links that let one browser in each, over TLS'),
+            fixed(self, 'listen', '127.0.0.1', 'address to listen on; beyond this machine '
+                  'everybody needs the token of the printed address'), port,
+            fixed(self, 'token', False, 'ask for a token on this machine too'),
+            fixed(self, 'open_cockpit', False,
+                  'let people in by links that let one browser in each, over TLS'),
             Path(certificate) if certificate else None, Path(key) if key else None,
-            Path(text('private', '', 'folder that only its owner can read, in which links and '
-                      'certificate outlive this node; a new one if empty')
+            Path(fixed(self, 'private', '', 'folder that only its owner can read, in which links '
+                       'and certificate outlive this node; a new one if empty')
                  or self._private.enter_context(TemporaryDirectory(prefix='crgame_'))))
 
     def run(self, stop: StopFlag) -> None:

@@ -25,17 +25,17 @@ from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.live_driver import DeviceDelay, live_driver, LiveForce
 from crgame_ros.ros.messages import from_time, to_joy, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.number_parameters import fixed
 from crgame_ros.ros.spinning import PromptNode, spin_promptly
 from crgame_ros.ros.trusted_code import TrustedCode
 from diagnostic_msgs.msg import DiagnosticStatus
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Joy
 from std_msgs.msg import String
 
 if TYPE_CHECKING:
-    from crgame_ros.ros.live_policy import PolicyWorld
+    from crgame_ros.ros.world_follower import WorldFollower
 
 DEVICE_POLL_S = 0.02
 
@@ -50,15 +50,12 @@ class DriverNode(PromptNode):
 
     def __init__(self) -> None:
         super().__init__('driver_node')
-        declare = self.declare_parameter
-        self._vehicle_id: str = declare('vehicle', 'hv0', ParameterDescriptor(
-            description="id of the human's vehicle", read_only=True)).value
-        self._choice: str = declare('source', '', ParameterDescriptor(
-            description="driver source instead of the game's: auto, idle, evdev[:NAME], "
-            'keys:FILE, joy:FILE, joy, policy:FILE.py:load', read_only=True)).value
-        self._joy_map: str = declare('joy_map', 'generic_gamepad', ParameterDescriptor(
-            description='device map for the messages of an external joy node',
-            read_only=True)).value
+        self._vehicle_id = fixed(self, 'vehicle', 'hv0', "id of the human's vehicle")
+        self._choice = fixed(
+            self, 'source', '', "driver source instead of the game's: auto, idle, evdev[:NAME], "
+            'keys:FILE, joy:FILE, joy, policy:FILE.py:load')
+        self._joy_map = fixed(self, 'joy_map', 'generic_gamepad',
+                              'device map for the messages of an external joy node')
         self._code = TrustedCode(self, self._choice)
         if self._choice:
             parse_source(self._choice)
@@ -72,7 +69,7 @@ class DriverNode(PromptNode):
         self._force = LiveForce(endpoints, self._vehicle_id, lambda: not self._silent,
                                 self.get_logger().warning)
         self._lock = threading.Lock()
-        self._world: PolicyWorld | None = None
+        self._world: WorldFollower | None = None
         self._driver: DriverSource | None = None
         self._game: GameDocument | None = None
         self._cycle = -1
@@ -134,11 +131,11 @@ class DriverNode(PromptNode):
             self._joy_subscription = self._endpoints.subscription(
                 '/<hv>/joy', self._on_joy, self._vehicle_id)
 
-    def _policy_world(self) -> 'PolicyWorld':
+    def _policy_world(self) -> 'WorldFollower':
         """Return the world of a policy; subscribe to it once, only where a policy drives."""
         if self._world is None:
-            from crgame_ros.ros.live_policy import PolicyWorld
-            self._world = PolicyWorld(self._endpoints)
+            from crgame_ros.ros.world_follower import WorldFollower
+            self._world = WorldFollower(self._endpoints, '/vehicles/state')
         return self._world
 
     def _on_seats(self, message: String) -> None:

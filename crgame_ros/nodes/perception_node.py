@@ -16,7 +16,8 @@ from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import Endpoints, NodeReport
 from crgame_ros.ros.messages import EXACT_VARIANCE, SeriesMessage, set_time
 from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
+from crgame_ros.ros.number_parameters import fixed
+from crgame_ros.ros.scenario_documents import ScenarioSet
 from crgame_ros.ros.spinning import poll
 from crgame_ros.ros.trusted_code import TrustedCode
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
@@ -24,7 +25,6 @@ from crgame_ros.vehicle.state import VehicleState
 from nav_msgs.msg import Odometry
 import numpy as np
 from numpy.typing import NDArray
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from sensor_msgs.msg import LaserScan
 
@@ -40,19 +40,15 @@ class PerceptionNode(Node):
 
     def __init__(self) -> None:
         super().__init__('perception_node')
-        self._vehicle_id: str = self.declare_parameter(
-            'vehicle', 'av0', ParameterDescriptor(
-                description='id of the AV that perceives', read_only=True)).value
+        self._vehicle_id = fixed(self, 'vehicle', 'av0', 'id of the AV that perceives')
         self._code = TrustedCode(self)
         endpoints = Endpoints(self)
-        self._documents = ScenarioDocuments(endpoints)
         self._world = WorldFollower(endpoints, '/vehicles/state', self._forget)
         self._true = endpoints.polled('/<av>/true_request', self._vehicle_id)
         self._perceived = endpoints.publisher('/<av>/plan_request', self._vehicle_id)
         self._localization = LocalizationMessage(endpoints, self._vehicle_id)
         self._scans = ScanMessages(endpoints, self._vehicle_id)
         self._report = NodeReport(endpoints, f'perception_node: {self._vehicle_id}')
-        self._scenario: ScenarioSet | None = None
         self._perception: Perception | None = None
         self._asked: JointSeries | None = None
         self._message: SeriesMessage | None = None
@@ -65,11 +61,7 @@ class PerceptionNode(Node):
 
     def _work(self) -> None:
         try:
-            scenario = self._documents.poll()
-            if scenario is not None:
-                self._scenario = scenario
-                self._forget()
-                self._world.begin(scenario)
+            self._world.look()
             message = self._true.latest()
             if message is not None:
                 self._asked = from_joint_trajectory(message, f'/{self._vehicle_id}/true_request')
@@ -86,7 +78,7 @@ class PerceptionNode(Node):
 
     def _observe(self, step: WorldStep) -> None:
         """Observe the true world at one step."""
-        scenario = self._scenario
+        scenario = self._world.scenario
         if scenario is None or step.n <= self._n:
             return
         place = next((row for row, item in enumerate(scenario.driven)
@@ -143,13 +135,14 @@ class PerceptionNode(Node):
 
     def _answer(self) -> None:
         """Publish the perceived request once the step of the true one has been observed."""
-        if self._asked is None or self._perception is None or self._scenario is None:
+        if self._asked is None or self._perception is None or self._world.scenario is None:
             return
-        n = self._scenario.game.scheduler.tick_of_stamp(self._asked.stamp_ns)
+        scheduler = self._world.scenario.game.scheduler
+        n = scheduler.tick_of_stamp(self._asked.stamp_ns)
         if n is None or n > self._n:
             return
         asked, self._asked = self._asked, None
-        if n < self._n - self._scenario.game.scheduler.steps_per_tick:
+        if n < self._n - scheduler.steps_per_tick:
             return
         try:
             request = self._perception.perceive(asked)

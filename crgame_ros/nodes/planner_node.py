@@ -18,13 +18,13 @@ from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import SeriesMessage, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.number_parameters import fixed
 from crgame_ros.ros.run_time import RunTime, TimeCourse, USUAL_NS
 from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
 from crgame_ros.ros.spinning import spin
 from crgame_ros.ros.trusted_code import TrustedCode
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from std_msgs.msg import Bool, String
 from trajectory_msgs.msg import JointTrajectory
@@ -38,13 +38,9 @@ class PlannerNode(Node):
 
     def __init__(self) -> None:
         super().__init__('planner_node')
-        self._vehicle_id: str = self.declare_parameter(
-            'vehicle', 'av0', ParameterDescriptor(
-                description='id of the AV to drive', read_only=True)).value
-        self._choice: str = self.declare_parameter(
-            'planner', '', ParameterDescriptor(
-                description='planner instead of the one that the game names',
-                read_only=True)).value
+        self._vehicle_id = fixed(self, 'vehicle', 'av0', 'id of the AV to drive')
+        self._choice = fixed(self, 'planner', '',
+                             'planner instead of the one that the game names')
         self._code = TrustedCode(self, self._choice)
         endpoints = Endpoints(self)
         self._plans = endpoints.publisher('/<av>/plan', self._vehicle_id)

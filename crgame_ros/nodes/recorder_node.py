@@ -16,15 +16,16 @@ from crgame_ros.paths import numbered
 from crgame_ros.recording.exceptions import RecordingError
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_folder import next_part, run_folder
+from crgame_ros.recording.run_folder import BAG, next_part, run_folder
+from crgame_ros.recording.standard_messages import standard_types
 from crgame_ros.recording.writer import BagWriter, LogClock
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription, relative
 from crgame_ros.ros.heard_topics import OFFSET, RECORDED
 from crgame_ros.ros.node_main import run_node, StopFlag
+from crgame_ros.ros.number_parameters import fixed
 from crgame_ros.ros.run_time import GameAwaited, RunTime, TimeCourse
 from crgame_ros.ros.spinning import poll
 from diagnostic_msgs.msg import DiagnosticStatus
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
@@ -67,11 +68,11 @@ class RecorderNode(Node):
 
     def __init__(self) -> None:
         super().__init__('recorder_node')
-        self._directory = Path(self.declare_parameter(
-            'directory', 'bag', ParameterDescriptor(
-                description='folder of the bag; those of later runs have its name and are in '
-                'run_2, run_3, … beside it',
-                read_only=True)).value)
+        self._directory = Path(fixed(
+            self, 'directory', BAG, 'folder of the bag; those of later runs have its name and '
+            'are in run_2, run_3, … beside it'))
+        # It takes a quarter of a second: now, while other nodes start, not at the first message.
+        standard_types()
         self._endpoints = Endpoints(self)
         self._topics: dict[str, RecordedTopic] = {}
         self._writer: BagWriter | None = None
@@ -368,8 +369,8 @@ def _simulation_in(bag: Path) -> str | None:
     """Return the simulation whose run is in a bag; None if it has not come that far."""
     try:
         with BagReader(bag) as reader:
-            for message in reader.decoded([GAME.topic]):
-                return GAME.read(message.message.data).simulation
+            for _, game in reader.documents(GAME):
+                return game.simulation
     except InputError:
         pass
     return None

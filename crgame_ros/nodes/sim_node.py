@@ -16,7 +16,7 @@ from crgame_ros.nodes.sim.control import SimControl
 from crgame_ros.nodes.sim.live_run import LiveRun
 from crgame_ros.nodes.sim.run_state import Outcome
 from crgame_ros.nodes.sim.simulation_interfaces import offer_simulation_interfaces
-from crgame_ros.recording.run_folder import run_folder
+from crgame_ros.recording.run_folder import GAME_FILE, run_folder
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.namespace_lock import hold_namespace
 from crgame_ros.ros.node_main import run_node, StopFlag
@@ -161,7 +161,7 @@ class SimNode(Node):
         """Write the resolved game beside its recording."""
         if self._control.folder is None:
             return
-        path = run_folder(self._control.folder, epoch) / 'game.yaml'
+        path = run_folder(self._control.folder, epoch) / GAME_FILE
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(game.dump(), encoding='utf-8')

@@ -16,7 +16,6 @@ from crgame_ros.roads.signs import TrafficLights
 from crgame_ros.ros.endpoints import Endpoints, NodeReport
 from crgame_ros.ros.messages import StateMessage
 from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
 from crgame_ros.ros.trusted_code import TrustedCode
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
@@ -45,12 +44,10 @@ class TrafficNode(Node):
         self._code = TrustedCode(self)
         endpoints = Endpoints(self)
         self._refusals = endpoints.refusals
-        self._documents = ScenarioDocuments(endpoints)
-        self._world = WorldFollower(endpoints, '/vehicles/tick_state', self._begin_anew)
+        self._world = WorldFollower(endpoints, '/vehicles/tick_state', self._begin)
         self._events = endpoints.polled('/scenario/events')
         self._agents = endpoints.publisher('/traffic/agents')
         self._report = NodeReport(endpoints, 'traffic_node: agents')
-        self._scenario: ScenarioSet | None = None
         self._spec: TrafficSpec | None = None
         self._traffic: Traffic | None = None
         self._k = 0
@@ -64,9 +61,7 @@ class TrafficNode(Node):
 
     def _work(self) -> None:
         try:
-            scenario = self._documents.poll()
-            if scenario is not None:
-                self._begin(scenario)
+            self._world.look()
             message = self._events.latest()
             if message is not None:
                 self._receive_events(message.data)
@@ -83,13 +78,8 @@ class TrafficNode(Node):
     @property
     def _knows_the_events(self) -> bool:
         """Return whether this run's events have been received, which agents need to continue."""
-        game = self._scenario.game if self._scenario is not None else None
+        game = self._world.scenario.game if self._world.scenario is not None else None
         return game is None or not game.events or self._events_so_far.epoch == game.epoch
-
-    def _begin_anew(self) -> None:
-        """Restart the same run."""
-        if self._scenario is not None:
-            self._begin(self._scenario)
 
     def _receive_events(self, text: str) -> None:
         try:
@@ -97,10 +87,11 @@ class TrafficNode(Node):
         except InputError as error:
             self._refusals.note('/scenario/events', str(error))
 
-    def _begin(self, scenario: ScenarioSet) -> None:
+    def _begin(self) -> None:
         """Prepare for a run; its agents are built when its world arrives."""
-        self._world.begin(scenario)
-        self._scenario, self._traffic, self._spec = scenario, None, None
+        scenario = self._world.scenario
+        assert scenario is not None
+        self._traffic, self._spec = None, None
         self._spec = scenario.game.traffic
         if self._spec is None:
             return
@@ -124,8 +115,8 @@ class TrafficNode(Node):
 
     def _advance(self, step: WorldStep) -> None:
         """Move the agents from the world of a tick to the next one."""
-        assert self._scenario is not None
-        scheduler = self._scenario.game.scheduler
+        assert self._world.scenario is not None
+        scheduler = self._world.scenario.game.scheduler
         k = scheduler.k(step.n)
         if self._traffic is not None and k == self._k - 1:
             # Published again because the answer may have been lost.
@@ -158,9 +149,9 @@ class TrafficNode(Node):
 
     def _obey(self, traffic: Traffic, k: int) -> None:
         """Apply the events up to a tick to the agents."""
-        assert self._scenario is not None
+        assert self._world.scenario is not None
         events = self._events_so_far
-        game = self._scenario.game
+        game = self._world.scenario.game
         actions = {event.name: event.action for event in game.events}
         for event in events.fired if events.epoch == game.epoch else ():
             action = actions.get(event.name)
@@ -171,16 +162,17 @@ class TrafficNode(Node):
 
     def _made(self, view: WorldView, k: int, step: WorldStep) -> Traffic:
         """Build the agents of a new run, or continue with those published before."""
-        assert self._scenario is not None and self._spec is not None
-        game, traffic = self._scenario.game, self._traffic
+        scenario = self._world.scenario
+        assert scenario is not None and self._spec is not None
+        game, traffic = scenario.game, self._traffic
         is_new = traffic is None
         if traffic is None:
             traffic = make_traffic(
-                self._spec, self._scenario.loaded, self._network, self._reader.others,
+                self._spec, scenario.loaded, self._network, self._reader.others,
                 self._obstacles, self._adopted, view, game.scheduler,
                 game.seed)
             if tuple(item.id for item in traffic.descriptions) != tuple(
-                    item.id for item in self._scenario.objects if item.role is Role.TRAFFIC):
+                    item.id for item in scenario.objects if item.role is Role.TRAFFIC):
                 raise InputError('lists other agents than traffic_node creates',
                                  '/scenario/objects', 'run all nodes from one version')
             gc.collect()

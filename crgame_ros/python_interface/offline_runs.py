@@ -24,11 +24,7 @@ from crgame_ros.python_interface.games import (
 )
 from crgame_ros.recording.conversion import write_openscenario
 from crgame_ros.recording.export import scenario_path, write_scenario
-from crgame_ros.recording.offline_recording import (
-    check_run_folder,
-    GAME_FILE,
-    write_recording,
-)
+from crgame_ros.recording.offline_recording import check_run_folder, write_recording
 from crgame_ros.recording.progress import Progress
 from crgame_ros.recording.recorded_game import (
     inputs_of,
@@ -36,6 +32,7 @@ from crgame_ros.recording.recorded_game import (
     RecordedInputs,
     with_recorded_events,
 )
+from crgame_ros.recording.run_folder import GAME_FILE
 from crgame_ros.recording.run_formats import OPENSCENARIO
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline

@@ -144,12 +144,7 @@ def _clock(reader: BagReader, epoch: int) -> tuple[FloatArray, float, float]:
 
 def _lists(reader: BagReader) -> _Lists:
     lists = _Lists()
-    for _, _, log_ns, message in reader.readable([STREAMS.topic]):
-        try:
-            document = STREAMS.read(str(message.data))
-        except InputError:
-            # The message may come from a foreign publisher.
-            continue
+    for log_ns, document in reader.documents(STREAMS):
         lists.found.append((log_ns, {stream.number: stream for stream in document.streams}))
     return lists
 

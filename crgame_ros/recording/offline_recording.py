@@ -25,6 +25,7 @@ from crgame_ros.messages.status_values import Status
 from crgame_ros.recording.exceptions import RecordingError
 from crgame_ros.recording.metadata import METADATA_FILE, TopicQos
 from crgame_ros.recording.run_cycles import CYCLE_TOPIC
+from crgame_ros.recording.run_folder import BAG, GAME_FILE
 from crgame_ros.recording.standard_messages import (
     clock_bytes,
     status_bytes,
@@ -44,9 +45,6 @@ from crgame_ros.whole_file import whole_folder
 import numpy as np
 from numpy.typing import NDArray
 
-# The recording and the game in the folder of a run.
-BAG = 'bag'
-GAME_FILE = 'game.yaml'
 _NOW = np.zeros(1, dtype=np.int64)
 # A message with its topic.
 _Sent = tuple[str, bytes]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 import struct
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, TypeVar
 
 from crgame_ros.errors import InputError
 from crgame_ros.messages.cdr import BIG_ENDIAN, HEADER_BYTES, LITTLE_ENDIAN
@@ -17,8 +17,11 @@ from crgame_ros.recording.run_folder import parts_of
 from crgame_ros.recording.schemas import is_foreign
 from crgame_ros.recording.standard_messages import standard_types
 from crgame_ros.recording.storage import BagMessage, McapStorage, RosbagsStorage, Storage
+from crgame_ros.schema.json_documents import JsonDocument
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores, TypesysError
+
+T = TypeVar('T')
 
 _WATCHED_EVERY = 1000
 _SUFFIXES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
@@ -149,7 +152,8 @@ class BagReader:
         for message in self.messages(topics, start_ns, end_ns):
             yield self.decode(message)
 
-    def readable(self, topics: Collection[str] | None = None) -> Iterator[DecodedMessage]:
+    def readable(self, topics: Collection[str] | None = None, start_ns: int | None = None,
+                 end_ns: int | None = None) -> Iterator[DecodedMessage]:
         """
         Yield messages as `decoded` does, but skip those that do not fit their type.
 
@@ -158,11 +162,26 @@ class BagReader:
 
         :raises InputError: as `messages`.
         """
-        for message in self.messages(topics):
+        for message in self.messages(topics, start_ns, end_ns):
             try:
                 yield self.decode(message)
             except InputError:
                 self.foreign[message[0]] += 1
+
+    def documents(self, kind: JsonDocument[T]) -> Iterator[tuple[int, T]]:
+        """
+        Yield the documents of a kind with their log times [ns], but skip malformed ones.
+
+        :raises InputError: as `messages`.
+        """
+        for _, _, log_ns, message in self.readable([kind.topic]):
+            try:
+                document = kind.read(str(message.data))
+            except (InputError, AttributeError):
+                # The message may come from a foreign publisher.
+                self.foreign[kind.topic] += 1
+                continue
+            yield log_ns, document
 
     def decode(self, message: BagMessage) -> DecodedMessage:
         """

@@ -13,7 +13,7 @@ from crgame_ros.game.documents import EVENTS, GAME, GameDocument
 from crgame_ros.game.events import AtStep, FiredEvent, PlannerSwap
 from crgame_ros.game.game import Game, parse_game, PoseSpawn
 from crgame_ros.paths import expanded
-from crgame_ros.recording.epochs import read_epoch, XML_TOPIC
+from crgame_ros.recording.epochs import Epoch, read_epoch, XML_TOPIC
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import replay_inputs
 from crgame_ros.recording.run_folder import recording_in
@@ -119,8 +119,9 @@ def recorded_inputs(setup: Setup) -> RecordedInputs:
         if source.kind != 'replay':
             continue
         bag = _bag(setup, source)
-        _check_same(setup, read_game_document(bag), bag)
-        commands, measured = replay_inputs(bag)
+        recorded = read_game_document(bag)
+        _check_same(setup, recorded, bag)
+        commands, measured = replay_inputs(bag, recorded.epoch)
         if human.id not in commands:
             raise InputError(f'{human.id} took no part', source.argument,
                              'it has ' + ', '.join(commands))
@@ -230,6 +231,21 @@ class RecordedEvents(NamedTuple):
     fired: tuple[FiredEvent, ...]
 
 
+def run_events(reader: BagReader, run: Epoch) -> RecordedEvents:
+    """
+    Return the events of a run in a recording.
+
+    :raises InputError: if the recording cannot be read.
+    """
+    fired: tuple[FiredEvent, ...] = ()
+    for log_ns, document in reader.documents(EVENTS):
+        # Each message holds all events since the start of its run.
+        if document.epoch == run.game.epoch and (run.from_log_ns is None
+                                                 or log_ns >= run.from_log_ns):
+            fired = document.fired
+    return RecordedEvents(frozenset(event.name for event in run.game.events), fired)
+
+
 def read_run_events(path: Path, epoch: int | None = None) -> RecordedEvents:
     """
     Read the events of a run from its recording.
@@ -237,23 +253,5 @@ def read_run_events(path: Path, epoch: int | None = None) -> RecordedEvents:
     :param epoch: which run, where a recording holds several; None for the last.
     :raises InputError: if there is no such run in it.
     """
-    games, fired = {}, {}
     with BagReader(path, parts=True) as reader:
-        for topic, _, _, message in reader.readable([GAME.topic, EVENTS.topic]):
-            try:
-                if topic == GAME.topic:
-                    game = GAME.read(message.data)
-                    games[game.epoch] = game
-                else:
-                    # Each message holds all events since the start of its run.
-                    events = EVENTS.read(message.data)
-                    fired[events.epoch] = events.fired
-            except InputError:
-                # The message may come from a foreign publisher.
-                continue
-    chosen = max(games, default=None) if epoch is None else epoch
-    if chosen is None or chosen not in games:
-        raise InputError('no such run in it' if games else f'no {GAME.topic} in it', str(path),
-                         'record all topics, from before the start of the run')
-    return RecordedEvents(frozenset(event.name for event in games[chosen].events),
-                          fired.get(chosen, ()))
+        return run_events(reader, read_epoch(reader, epoch))

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from crgame_ros.errors import InputError
 from crgame_ros.messages.cdr import aligned, LITTLE_ENDIAN
+from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS, CycleTable
 import numpy as np
@@ -46,9 +47,7 @@ def read_cycles(bag: Path | BagReader, epoch: int | None = None) -> CycleTable:
     if isinstance(bag, Path):
         with BagReader(bag, parts=True) as reader:
             return read_cycles(reader, epoch)
-    tables = cycle_tables(bag)
-    wanted = tables[-1].epoch if epoch is None and tables else epoch
-    return table_of(tables, wanted, bag)
+    return table_of(cycle_tables(bag), read_epoch(bag).game.epoch if epoch is None else epoch, bag)
 
 
 def cycle_tables(reader: BagReader) -> list[CycleTable]:
@@ -59,7 +58,7 @@ def cycle_tables(reader: BagReader) -> list[CycleTable]:
     return [table for table in _readable_tables(reader) if len(table.rows)]
 
 
-def table_of(tables: Sequence[CycleTable], epoch: int | None, reader: BagReader) -> CycleTable:
+def table_of(tables: Sequence[CycleTable], epoch: int, reader: BagReader) -> CycleTable:
     """Join the cycles of one run."""
     epochs = [table.epoch for table in tables]
     tables = [table for table in tables if table.epoch == epoch]

@@ -10,6 +10,10 @@ from crgame_ros.recording.metadata import METADATA_FILE
 
 # Marks a folder in which nothing more will be written, even if some files failed.
 FINISHED_MARK = '.finished'
+# The file that exists while the processes of a session are alive or after they were killed.
+CLAIM = '.started'
+# The recording and the game in the folder of a run.
+BAG, GAME_FILE = 'bag', 'game.yaml'
 # Suffix of the folder of a restarted recorder.
 _PART = re.compile(r'_part([1-9][0-9]*)$')
 _LATER = re.compile(r'run_([1-9][0-9]*)')
@@ -46,7 +50,7 @@ def participant_folder(run: Path) -> Path | None:
 
 def recording_in(path: Path) -> Path:
     """Return the recording in the folder of a run; a recording itself is returned unchanged."""
-    inside = path / 'bag'
+    inside = path / BAG
     return inside if inside.is_dir() and not (path / METADATA_FILE).exists() else path
 
 
@@ -74,6 +78,12 @@ def run_name(path: Path) -> str:
 def bags_of(folder: Path) -> list[Path]:
     """Find a run's recordings in order: several if the recorder was restarted."""
     return sorted((path for path in folder.glob('bag*') if path.is_dir()), key=_order)
+
+
+def is_closed(run: Path) -> bool:
+    """Return whether a run's last recording has been closed, so that it can be read whole."""
+    bags = bags_of(run)
+    return bool(bags) and (bags[-1] / METADATA_FILE).is_file()
 
 
 def parts_of(bag: Path) -> list[Path]:

@@ -18,9 +18,9 @@ from crgame_ros.game.task_documents import TASK_LOG, TaskEntry
 from crgame_ros.messages.cdr import header_stamp_ns, stamp_of
 from crgame_ros.messages.joints import VEHICLES_TOPIC
 from crgame_ros.messages.status_values import read_status, status_amount
-from crgame_ros.recording.epochs import read_epoch
+from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.recorded_game import read_run_events
+from crgame_ros.recording.recorded_game import run_events
 from crgame_ros.recording.run_trajectories import (
     read_trajectories,
     RunTrajectories,
@@ -37,24 +37,14 @@ _DRIVER = re.compile('(?:cockpit|driver)_node: (.+) driver')
 _DELAYS = ('input_delay_ms', 'round_trip_ms')
 
 
-def read_task_entries(path: Path, epoch: int) -> tuple[TaskEntry, ...]:
+def task_entries(reader: BagReader, run: Epoch) -> tuple[TaskEntry, ...]:
     """
-    Read the task entries of one run, in order; empty for a game without tasks.
+    Return the task entries of a run in a recording, in order; empty for a game without tasks.
 
-    :param epoch: which run.
     :raises InputError: if the recording cannot be read.
     """
-    found: list[TaskEntry] = []
-    with BagReader(path, parts=True) as reader:
-        for _, _, _, message in reader.readable([TASK_LOG.topic]):
-            try:
-                log = TASK_LOG.read(message.data)
-            except InputError:
-                # The message may come from a foreign publisher.
-                continue
-            if log.epoch == epoch:
-                found += log.entries
-    return tuple(found)
+    return tuple(entry for _, log in reader.documents(TASK_LOG)
+                 if log.epoch == run.game.epoch for entry in log.entries)
 
 
 class SeatOrder(NamedTuple):
@@ -71,39 +61,47 @@ class SeatOrder(NamedTuple):
     source: str
 
 
-def read_seat_orders(path: Path, epoch: int | None = None) -> tuple[SeatOrder, ...]:
+def seat_orders(reader: BagReader, run: Epoch) -> tuple[SeatOrder, ...]:
     """
-    Read the orders of a run from its recording.
+    Return the orders of a run in a recording.
 
     They carry no stamp: each belongs to the newest state that was recorded before it.
+
+    :raises InputError: if the recording cannot be read.
+    """
+    topic = reader.topics.get(ORDER.topic)
+    if topic is None or not topic.message_count:
+        return ()
+    found: list[SeatOrder] = []
+    newest: int | None = None
+    for message in reader.messages([ORDER.topic, VEHICLES_TOPIC]):
+        if message.topic == VEHICLES_TOPIC:
+            stamp_ns = header_stamp_ns(message.data)
+            held = run.holds(stamp_ns, message.log_time_ns)
+            newest = run.game.scheduler.step_of_stamp(stamp_ns) if held else None
+            continue
+        if newest is None:
+            # It came before the run's first state, or belongs to another run.
+            continue
+        try:
+            demand = ORDER.read(str(reader.decode(message).message.data))
+        except InputError:
+            # The message may come from a foreign publisher.
+            continue
+        if demand.source is not None and VEHICLE_ID.fullmatch(demand.seat):
+            found.append(SeatOrder(newest, demand.seat, demand.source))
+    return tuple(found)
+
+
+def read_seat_orders(path: Path, epoch: int | None = None) -> tuple[SeatOrder, ...]:
+    """
+    Read the orders of a run from its recording, as `seat_orders` does.
 
     :param epoch: which run, where a recording holds several; None for the last.
     :raises InputError: if there is no such run in it.
     """
     with BagReader(path, parts=True) as reader:
-        topic = reader.topics.get(ORDER.topic)
-        if topic is None or not topic.message_count:
-            return ()
-        run = read_epoch(reader, epoch)
-        found: list[SeatOrder] = []
-        newest: int | None = None
-        for message in reader.messages([ORDER.topic, VEHICLES_TOPIC]):
-            if message.topic == VEHICLES_TOPIC:
-                stamp_ns = header_stamp_ns(message.data)
-                held = run.holds(stamp_ns, message.log_time_ns)
-                newest = run.game.scheduler.step_of_stamp(stamp_ns) if held else None
-                continue
-            if newest is None:
-                # It came before the run's first state, or belongs to another run.
-                continue
-            try:
-                demand = ORDER.read(str(reader.decode(message).message.data))
-            except InputError:
-                # The message may come from a foreign publisher.
-                continue
-            if demand.source is not None and VEHICLE_ID.fullmatch(demand.seat):
-                found.append(SeatOrder(newest, demand.seat, demand.source))
-        return tuple(found)
+        return seat_orders(reader, read_epoch(reader, epoch))
 
 
 class RecordedDriver(NamedTuple):
@@ -122,48 +120,46 @@ class RecordedDriver(NamedTuple):
     round_trip_ms: float | None
 
 
-def read_drivers(path: Path, epoch: int | None = None) -> tuple[RecordedDriver, ...]:
+def drivers_of(reader: BagReader, run: Epoch) -> tuple[RecordedDriver, ...]:
     """
-    Read the drivers of a run from its recording; empty if the recording does not name them.
+    Return the drivers of a run in a recording; empty if the recording does not name them.
 
-    :param epoch: which run, where a recording holds several; None for the last.
-    :raises InputError: if there is no such run in it.
+    :raises InputError: if the recording cannot be read.
     """
-    with BagReader(path, parts=True) as reader:
-        topic = reader.topics.get(DRIVERS.topic)
-        if topic is None or not topic.message_count:
-            return ()
-        run = read_epoch(reader, epoch)
-        spells: tuple[DrivingSpell, ...] = ()
-        # By seat, person and name of the value.
-        delays_ms: dict[tuple[str, str, str], list[float]] = defaultdict(list)
-        for message in reader.readable([DRIVERS.topic, _DIAGNOSTICS]):
-            content = message.message
-            if message.topic == DRIVERS.topic:
-                spells = _newer(spells, str(content.data), run.game.epoch)
-            elif run.holds(stamp_of(content), message.log_time_ns):
-                for status in map(read_status, content.status):
-                    if found := _DRIVER.fullmatch(status.name):
-                        for name in _DELAYS:
-                            delay_ms = status_amount(status.values, name)
-                            # It may not be measured yet.
-                            if delay_ms is not None:
-                                delays_ms[found[1], status.values.get('person', ''),
-                                          name].append(delay_ms)
+    spells: tuple[DrivingSpell, ...] = ()
+    for _, document in reader.documents(DRIVERS):
+        # Each message holds all spells so far.
+        if document.epoch == run.game.epoch:
+            spells = document.drivers
+    if not spells:
+        return ()
+    # By seat, person and name of the value.
+    delays_ms: dict[tuple[str, str, str], list[float]] = defaultdict(list)
+    for message in reader.readable([_DIAGNOSTICS]):
+        content = message.message
+        if run.holds(stamp_of(content), message.log_time_ns):
+            for status in map(read_status, content.status):
+                if found := _DRIVER.fullmatch(status.name):
+                    for name in _DELAYS:
+                        delay_ms = status_amount(status.values, name)
+                        # It may not be measured yet.
+                        if delay_ms is not None:
+                            delays_ms[found[1], status.values.get('person', ''),
+                                      name].append(delay_ms)
     return tuple(RecordedDriver(item, *(_median(delays_ms.get(
         (item.seat, '' if item.person is None else item.person.id, name)))
         for name in _DELAYS)) for item in spells)
 
 
-def _newer(spells: tuple[DrivingSpell, ...], text: str,
-           wanted: int) -> tuple[DrivingSpell, ...]:
-    """Return the driving spells of the wanted run; each message holds all so far."""
-    try:
-        newer = DRIVERS.read(text)
-    except InputError:
-        # The message may come from a foreign publisher.
-        return spells
-    return newer.drivers if newer.epoch == wanted else spells
+def read_drivers(path: Path, epoch: int | None = None) -> tuple[RecordedDriver, ...]:
+    """
+    Read the drivers of a run from its recording, as `drivers_of` does.
+
+    :param epoch: which run, where a recording holds several; None for the last.
+    :raises InputError: if there is no such run in it.
+    """
+    with BagReader(path, parts=True) as reader:
+        return drivers_of(reader, read_epoch(reader, epoch))
 
 
 def _median(values: list[float] | None) -> float | None:
@@ -257,18 +253,16 @@ def record_of_log(path: Path, log: RunTrajectories) -> RunRecord:
 
     :raises InputError: if its events cannot be read.
     """
+    with BagReader(path, parts=True) as reader:
+        run = read_epoch(reader, log.game.epoch)
+        fired = run_events(reader, run).fired
+        orders, drivers = seat_orders(reader, run), drivers_of(reader, run)
+        tasks = task_entries(reader, run) if log.game.tasks else ()
     vehicles = [item.id for item in log.vehicles]
-    fired = read_run_events(path, log.game.epoch).fired
-    orders = read_seat_orders(path, log.game.epoch)
-    drivers = read_drivers(path, log.game.epoch)
-    tasks = read_task_entries(path, log.game.epoch) if log.game.tasks else ()
-    if log.cycles is None:
-        return RunRecord(log, np.empty(0, dtype=np.int64),
-                         np.empty((0, len(vehicles), len(COMMAND_COLUMNS))), fired, orders,
-                         drivers, tasks)
-    ns = log.cycles.column('n').astype(np.int64)
-    return RunRecord(log, ns, log.cycles.commands_of(vehicles), fired, orders, drivers,
-                     tasks)
+    ns, commands = np.empty(0, dtype=np.int64), np.empty((0, len(vehicles), len(COMMAND_COLUMNS)))
+    if log.cycles is not None:
+        ns, commands = log.cycles.column('n').astype(np.int64), log.cycles.commands_of(vehicles)
+    return RunRecord(log, ns, commands, fired, orders, drivers, tasks)
 
 
 def run_record_of(result: OfflineResult) -> RunRecord:

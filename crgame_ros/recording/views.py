@@ -11,7 +11,6 @@ import re
 import statistics
 from typing import NamedTuple
 
-from crgame_ros.errors import InputError
 from crgame_ros.game.view_documents import VIEW_PICTURE, ViewEye, ViewPicture, ViewPlace
 from crgame_ros.messages.status_values import Status, status_amount, status_truth
 from crgame_ros.recording.reader import BagReader
@@ -203,15 +202,7 @@ def read_pictures(path: Path, epoch: int) -> dict[str, SeatPictures]:
     """
     found: dict[str, PictureKeeper] = defaultdict(PictureKeeper)
     with BagReader(path, parts=True) as reader:
-        if VIEW_PICTURE.topic not in reader.topics:
-            return {}
-        for topic, _, _, message in reader.readable([VIEW_PICTURE.topic]):
-            try:
-                picture = VIEW_PICTURE.read(str(message.data))
-            except (InputError, AttributeError):
-                # The message may come from a foreign publisher.
-                reader.foreign[topic] += 1
-                continue
+        for _, picture in reader.documents(VIEW_PICTURE):
             if picture.epoch == epoch:
                 found[picture.seat].add(picture)
     return {seat: keeper.kept() for seat, keeper in found.items()}

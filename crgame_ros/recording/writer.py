@@ -20,7 +20,7 @@ from crgame_ros.recording.metadata import (
     TopicQos,
     write_metadata,
 )
-from crgame_ros.recording.schemas import schema_text, type_hash
+from crgame_ros.recording.schemas import type_schema
 from mcap.writer import CompressionType, Writer
 
 # A file is some 5 % larger than with 0.9 s.
@@ -117,12 +117,12 @@ class BagWriter:
         :param type_name: such as `nav_msgs/msg/Odometry`.
         :param qos: the publisher's offer; a replay offers the same.
         :returns: the channel to write its messages to.
-        :raises InputError: if the type is not installed.
+        :raises InputError: if it is no type of ROS 2 Jazzy.
         :raises RecordingError: if the recording has failed.
         """
         if self.failed is not None:
             raise self.failed
-        definition, digest = schema_text(type_name), type_hash(type_name)
+        definition, digest = type_schema(type_name)
         try:
             if type_name not in self._schemas:
                 self._schemas[type_name] = self._mcap.register_schema(
@@ -210,7 +210,7 @@ class BagWriter:
 
     def _metadata(self) -> BagMetadata:
         topics = tuple(BagTopic(name, type_name, self._counts[channel], (qos,),
-                                type_hash(type_name))
+                                type_schema(type_name)[1])
                        for channel, (name, type_name, qos) in self._topics.items())
         file = BagFile(self.path.name, self._start_ns, self._end_ns, self.message_count)
         return BagMetadata('mcap', (file,), topics)

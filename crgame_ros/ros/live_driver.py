@@ -33,7 +33,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import JointState
 
 if TYPE_CHECKING:
-    from crgame_ros.ros.live_policy import PolicyWorld
+    from crgame_ros.ros.world_follower import WorldFollower
 
 REFRESH_S = 0.008
 # Period of the search for a motor [s].
@@ -44,7 +44,8 @@ _KEPT = 21
 
 
 def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str,
-                say: Callable[[str], object], world: 'Callable[[], PolicyWorld]') -> DriverSource:
+                say: Callable[[str], object], world: 'Callable[[], WorldFollower]'
+                ) -> DriverSource:
     """
     Build a driver source.
 

@@ -2,55 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A driver source that lets a policy drive a human's seat in a live run."""
 
-from collections.abc import Callable
-
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.policy.driver import DrivenSeat, PolicyDriver
 from crgame_ros.policy.policy_file import load_policy
-from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
-from crgame_ros.ros.world_follower import WorldFollower, WorldStep
+from crgame_ros.ros.world_follower import WorldFollower
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
-
-
-class PolicyWorld:
-    """
-    The run that a policy observes; a node has one, whatever drives.
-
-    :param endpoints: of the node.
-    """
-
-    def __init__(self, endpoints: Endpoints) -> None:
-        self._documents = ScenarioDocuments(endpoints)
-        self._world = WorldFollower(endpoints, '/vehicles/state', self._again)
-        self.scenario: ScenarioSet | None = None
-        self._begin: Callable[[], object] = lambda: None
-
-    def follow(self, begin: Callable[[], object]) -> None:
-        """Call a function at the beginning of each run from now on."""
-        self._begin = begin
-
-    def steps(self) -> list[WorldStep]:
-        """
-        Return the steps that have come.
-
-        :raises CrgameError: if a document cannot be used.
-        """
-        scenario = self._documents.poll()
-        if scenario is not None:
-            self.scenario = scenario
-            self._world.begin(scenario)
-            self._begin()
-        if self.scenario is None:
-            self._world.drop()
-        return list(self._world.steps())
-
-    def _again(self) -> None:
-        """Restart the same run, because a recording is played again."""
-        if self.scenario is not None:
-            self._world.begin(self.scenario)
-            self._begin()
 
 
 class LivePolicyDriver(DriverSource):
@@ -68,12 +25,12 @@ class LivePolicyDriver(DriverSource):
 
     is_looking = True
 
-    def __init__(self, name: str, vehicle_id: str, world: PolicyWorld) -> None:
+    def __init__(self, name: str, vehicle_id: str, world: WorldFollower) -> None:
         self._policy = load_policy(name, vehicle_id)
         self._vehicle_id, self._world = vehicle_id, world
         self._driver: PolicyDriver | None = None
         self._latest_n = -1
-        world.follow(self._begin)
+        world.begin = self._begin
         if world.scenario is not None:
             self._begin()
 
@@ -86,6 +43,9 @@ class LivePolicyDriver(DriverSource):
         """Observe the new steps, and choose an action at scenario steps."""
         decided = False
         try:
+            self._world.look()
+            if self._world.scenario is None:
+                self._world.drop()
             for step in self._world.steps():
                 if self._driver is not None:
                     self._driver.see(step.n, step.states, step.objects if step.tick else None)

@@ -1,17 +1,32 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A lock on a namespace of a ROS domain, held by one simulation."""
+"""Namespaces of a ROS domain: reads their names, and locks one for one simulation."""
 
+import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 import fcntl
 import os
 from pathlib import Path
+import re
 
 from crgame_ros.errors import InputError, refusing
 
 # Where every shell of a user looks, whatever its TMPDIR is, and where a full disk is no hindrance.
 FOLDER = Path('/tmp')
+
+
+def read_namespace(text: str) -> str:
+    """
+    Return a namespace from the command line, with its slash.
+
+    :raises argparse.ArgumentTypeError: if it is none.
+    """
+    if text != '/' and not re.fullmatch(
+            r'/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*', text):
+        raise argparse.ArgumentTypeError(
+            f'{text} is no namespace: letters, digits and _ between /')
+    return '/' + text.removeprefix('/')
 
 
 @contextmanager

@@ -1,13 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Number parameters, which accept whole numbers too."""
+"""Parameters of nodes: numbers, which accept whole ones too, and what is set at the start only."""
 
 import math
+from typing import TypeVar
 
 from crgame_ros.errors import InputError
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+
+T = TypeVar('T')
+
+
+def fixed(node: Node, name: str, default: T, description: str) -> T:
+    """Declare a parameter that can be set at the start only, and return its value."""
+    value: T = node.declare_parameter(name, default, ParameterDescriptor(
+        description=description, read_only=True)).value
+    return value
 
 
 def declare_number(node: Node, name: str, default: float, description: str,

@@ -10,6 +10,7 @@ import shlex
 from tempfile import TemporaryDirectory
 
 from crgame_ros.errors import InputError
+from crgame_ros.ros.namespace_lock import read_namespace
 
 DESCRIPTION = """\
 Write a Fast DDS profile with which nodes that you start one by one take a run's own topics from
@@ -25,7 +26,7 @@ docs/nodes.md tells which topics these are."""
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument('file', type=Path, help='the profile, in a folder that exists')
-    parser.add_argument('--namespace', default='', metavar='/NAME',
+    parser.add_argument('--namespace', type=read_namespace, default='/', metavar='/NAME',
                         help="of the run's nodes (default: none)")
     parser.add_argument('--own-orders', action='store_true',
                         help='of services, /seats/order and /trigger as well')

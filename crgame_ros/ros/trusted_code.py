@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from rcl_interfaces.msg import ParameterDescriptor
+from crgame_ros.ros.number_parameters import fixed
 from rclpy.node import Node
 
 
@@ -21,9 +21,8 @@ class TrustedCode:
     """
 
     def __init__(self, node: Node, *named: str) -> None:
-        roster: str = node.declare_parameter('roster', '', ParameterDescriptor(
-            description='file in which sim_node lists the code that game files name; code that '
-            'only a message names is not run', read_only=True)).value
+        roster = fixed(node, 'roster', '', 'file in which sim_node lists the code that game files '
+                       'name; code that only a message names is not run')
         self._roster = Path(roster) if roster else None
         self._named = named
 

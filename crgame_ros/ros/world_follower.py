@@ -61,30 +61,43 @@ class WorldStep:
 
 class WorldFollower:
     """
-    The states of vehicles and `/traffic/objects`, combined in order and without a gap.
+    A run's documents, and the states of its vehicles and `/traffic/objects`, in order, no gap.
 
     :param endpoints: of the node.
     :param states: topic of the vehicles, at every step or at scenario time steps alone.
-    :param begin_anew: called where the run begins again, as in a recording that is played again,
-        before the first of its steps is returned.
+    :param begin: called where a run begins, or begins again, as in a recording that is played
+        again, before the first of its steps is returned.
+    :ivar scenario: the run's documents; None before the first run.
     """
 
     def __init__(self, endpoints: Endpoints, states: str,
-                 begin_anew: Callable[[], object] = lambda: None) -> None:
-        self._begin_anew = begin_anew
+                 begin: Callable[[], object] = lambda: None) -> None:
+        self.begin = begin
+        self.scenario: ScenarioSet | None = None
+        self._documents = ScenarioDocuments(endpoints)
         self._time = RunTime()
         self._states = endpoints.polled(states)
         self._objects = endpoints.polled('/traffic/objects', depth=MAX_WAITING)
-        self._scenario: ScenarioSet | None = None
         self._waiting: deque[JointTrajectory] = deque(maxlen=MAX_STATES)
         # Messages far ahead of the others: of a run that goes on there, or false.
         self._ahead: list[JointTrajectory] = []
         self._objects_by_n: dict[int, ObjectStates] = {}
         self._latest: ObjectStates | None = None
 
-    def begin(self, scenario: ScenarioSet) -> None:
+    def look(self) -> None:
+        """
+        Begin another run if its documents have come.
+
+        :raises CrgameError: if a document cannot be used.
+        """
+        scenario = self._documents.poll()
+        if scenario is not None:
+            self.follow(scenario)
+            self.begin()
+
+    def follow(self, scenario: ScenarioSet) -> None:
         """Follow another run; messages of it that have already come are kept."""
-        self._scenario = scenario
+        self.scenario = scenario
         # A new run begins ahead of the one before. One that is played again goes back, which its
         # messages tell.
         begins_ns = scenario.game.scheduler.clock_offset_ns
@@ -104,11 +117,12 @@ class WorldFollower:
     def steps(self) -> Iterator[WorldStep]:
         """Yield every step that is complete, once."""
         self._receive_states()
-        if self._scenario is None:
+        scenario = self.scenario
+        if scenario is None:
             return
-        self._receive_objects(self._scenario)
+        self._receive_objects(scenario)
         while self._waiting:
-            step = self._complete(self._scenario, self._waiting[0])
+            step = self._complete(scenario, self._waiting[0])
             if step is None:
                 return
             self._waiting.popleft()
@@ -130,7 +144,8 @@ class WorldFollower:
                 self._waiting.clear()
                 self._objects_by_n.clear()
                 self._latest = None
-                self._begin_anew()
+                if self.scenario is not None:
+                    self.begin()
             if course is not TimeCourse.BEHIND:
                 self._waiting.append(message)
 
@@ -191,9 +206,7 @@ class ObserverNode(Node, ABC, Generic[Observer]):
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self.endpoints = Endpoints(self)
-        self._documents = ScenarioDocuments(self.endpoints)
-        self._world = WorldFollower(self.endpoints, '/vehicles/state', self._begin_anew)
-        self._scenario: ScenarioSet | None = None
+        self._world = WorldFollower(self.endpoints, '/vehicles/state', self._begin)
         self._observer: Observer | None = None
 
     @abstractmethod
@@ -215,7 +228,7 @@ class ObserverNode(Node, ABC, Generic[Observer]):
     @property
     def epoch(self) -> int:
         """Return the epoch of the observed run; -1 before the first."""
-        return -1 if self._scenario is None else self._scenario.game.epoch
+        return -1 if self._world.scenario is None else self._world.scenario.game.epoch
 
     def run(self, stop: StopFlag) -> None:
         """Observe until asked to stop."""
@@ -223,10 +236,8 @@ class ObserverNode(Node, ABC, Generic[Observer]):
 
     def _work(self) -> None:
         try:
-            scenario = self._documents.poll()
-            if scenario is not None:
-                self._begin(scenario)
-            if self._scenario is None:
+            self._world.look()
+            if self._world.scenario is None:
                 self._world.drop()
             for step in self._world.steps():
                 self._observe(step)
@@ -235,23 +246,18 @@ class ObserverNode(Node, ABC, Generic[Observer]):
             self._observer = None
             self.get_logger().error(f'{error}; nothing is checked until the next game')
 
-    def _begin(self, scenario: ScenarioSet) -> None:
-        self._scenario, self._observer = scenario, None
-        self._world.begin(scenario)
-        game = scenario.game
+    def _begin(self) -> None:
+        scenario = self._world.scenario
+        assert scenario is not None
+        game, self._observer = scenario.game, None
         self._observer = self.make(documented_run(
             game, scenario.loaded, scenario.objects,
             None if game.occupancy is None else TiledOccupancy(game.occupancy)))
 
-    def _begin_anew(self) -> None:
-        """Observe the same run from its start, because a recording is played again."""
-        if self._scenario is not None:
-            self._begin(self._scenario)
-
     def _observe(self, step: WorldStep) -> None:
-        if self._observer is None or self._scenario is None:
+        if self._observer is None or self._world.scenario is None:
             return
-        scheduler = self._scenario.game.scheduler
+        scheduler = self._world.scenario.game.scheduler
         stamp_ns = self.endpoints.diagnostics.now_ns = scheduler.stamp_ns(step.n)
         self._observer.observe(step.n, scheduler.since_tick_s(step.n), step.states,
                                step.objects if step.tick else None)

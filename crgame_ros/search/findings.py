@@ -23,7 +23,7 @@ from crgame_ros.evaluation.variants_page import (
 from crgame_ros.game.game import Game, HumanSpec, LaneletSpawn, PoseSpawn
 from crgame_ros.game.object_spec import BICYCLE_TYPES, ObjectSpec
 from crgame_ros.paths import make_folder
-from crgame_ros.recording.offline_recording import GAME_FILE
+from crgame_ros.recording.run_folder import GAME_FILE
 from crgame_ros.search.search import SearchResult
 from crgame_ros.search.text import boundary_slices, changes, told, values_text, verdict
 from crgame_ros.search.trials import Outcome

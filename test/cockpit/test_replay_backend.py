@@ -38,6 +38,7 @@ from replay_support import (
     read_frames,
     record,
     recorder,
+    samples,
     START,
     TRAJECTORY,
 )
@@ -323,6 +324,29 @@ def test_plans_that_are_none_are_passed_over(tmp_path: Path, parked: OfflineResu
         assert [int(head[2]) for _, head, _ in read_frames(backend.chunk(0)).plans] == [0]
     finally:
         backend.close()
+
+
+def test_messages_that_cannot_be_read_are_passed_over(
+        tmp_path: Path, parked: OfflineResult) -> None:
+    """Any node may publish on a run's topics: its messages cost none of the chunk's frames."""
+    own = [*recorder.messages(parked), *plans(parked)]
+    floats = 'std_msgs/msg/Float64MultiArray'
+    strange = [('/timing/cycle', floats, START + 205_000_000, samples.cycles([(0, 20)], 'n,x')),
+               ('/timing/cycle', floats, START + 206_000_000, b'\x00\x01\x00\x00'),
+               # It is the last plan before the second chunk, too.
+               ('/av0/plan', TRAJECTORY, START + 4_990_000_000, recorder.joints(
+                   4_900_000_000, ['x'], [1.0], [1.0], [1.0])[:70])]
+    sound, odd = (ReplayBackend(record(tmp_path / name, messages)) for name, messages in (
+        ('sound', own), ('odd', [*own, *strange])))
+    try:
+        for number in range(3):
+            found, expected = (read_frames(backend.chunk(number)) for backend in (odd, sound))
+            assert [head.tolist() for _, head, _ in found.states] \
+                == [head.tolist() for _, head, _ in expected.states]
+            assert len(found.objects) == len(expected.objects)
+    finally:
+        sound.close()
+        odd.close()
 
 
 def test_progress_is_told_when_it_takes_long(bag: Path) -> None:

@@ -4,24 +4,32 @@
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import asdict
 import io
 import json
 from pathlib import Path
 import shutil
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 import zipfile
 
 from aiohttp import ClientSession, CookieJar, WSMsgType
 from cockpit_support import HOST, in_loop, PATIENCE_S, PumpBackend
 from crgame_ros.analysis.scores.run_scores import scores_of
 from crgame_ros.cockpit.access import Access
-from crgame_ros.cockpit.runs.archive import run_id, RunArchive
+from crgame_ros.cockpit.runs import routes
+from crgame_ros.cockpit.runs.archive import PastRun, run_id, RunArchive
+from crgame_ros.cockpit.runs.jobs import score
 from crgame_ros.cockpit.runs.routes import add_run_routes
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.errors import InputError
+from crgame_ros.game.events import FiredEvent
 from crgame_ros.recording.run_record import read_run_record
+from crgame_ros.recording.run_trajectories import read_trajectories
+from crgame_ros.vehicle.state import StateColumn
+import numpy as np
 import pytest
-from replay_support import drive, PARKED, plans, record, recorder
+from replay_support import drive, PARKED, plans, record, recorder, samples, START
 
 HEADER = {'X-Crgame': '1'}
 TITLE = '<b>Parked</b>\u202e'
@@ -118,6 +126,21 @@ async def test_runs_are_listed_scored_drawn_and_sent(tmp_path: Path, bag: Path) 
         assert len(archive.namelist()) == len(runs[0]['files'])
 
 
+def test_the_jump_of_a_put_back_is_no_distance(tmp_path: Path) -> None:
+    """The page shows the distance that tables and reports show."""
+    result = drive(PARKED, 4.0)
+    fired = asdict(FiredEvent.put_back('hv0', 205, 20))
+    bag = record(tmp_path / 'bag', [*recorder.messages(result), (
+        '/scenario/events', 'std_msgs/msg/String', START + 2_051_000_000,
+        samples.string(json.dumps({'epoch': 0, 'fired': [fired]})))])
+    log = read_trajectories(bag)
+    steps = np.hypot(*np.diff(log.vehicle_states[:, 0, :2], axis=0).T)
+    vehicles = {each['vehicle']: each for each in cast(Any, score(bag)['vehicles'])}
+    assert steps[20:22].min() > 0.01
+    assert vehicles['hv0']['distance'] == pytest.approx(steps.sum() - steps[20:22].sum())
+    assert vehicles['hv0']['fastest'] == log.vehicle_states[:, 0, StateColumn.SPEED].max()
+
+
 @in_loop
 async def test_nothing_beside_the_files_of_a_run_is_sent(tmp_path: Path, bag: Path) -> None:
     session = make_run(tmp_path / 'now', bag)
@@ -175,6 +198,33 @@ def test_runs_are_listed_again_only_for_one_that_is_not_known(tmp_path: Path, ba
     shutil.rmtree(later)
     with pytest.raises(InputError, match='there is no such run'):
         archive.run(run_id(later))
+
+
+@in_loop
+async def test_a_replay_that_died_is_ended_before_it_begins_again(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its standard input is closed, and no living replay has to make room for it."""
+    began, ended = list[str](), list[str]()
+
+    async def start(run: PastRun) -> Any:
+        began.append(run.id)
+        return SimpleNamespace(process=SimpleNamespace(returncode=None, run=run.id))
+
+    async def end(process: Any) -> None:
+        ended.append(process.run)
+
+    monkeypatch.setattr(routes, '_start', start)
+    monkeypatch.setattr(routes, '_end', end)
+    replays = routes.RunReplays()
+    runs = [PastRun(str(number), tmp_path, tmp_path) for number in range(routes.MOST_REPLAYS)]
+    for run in runs:
+        found = await replays._replay(run)
+    cast(Any, found.process).returncode = -9
+    await replays._replay(runs[-1])
+    assert began == ['0', '1', '2', '2'] and ended == ['2']
+    assert await replays._replay(runs[-1]) is not found and len(began) == 4
+    await replays.close()
+    assert sorted(ended) == ['0', '1', '2', '2']
 
 
 @pytest.mark.exhaustive

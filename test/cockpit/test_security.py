@@ -27,7 +27,7 @@ from cockpit_support import (
     wait_until,
 )
 from crgame_ros.cockpit.access import cookie_for
-from crgame_ros.cockpit.server import MAX_MALFORMED
+from crgame_ros.cockpit.page_socket import MAX_MALFORMED
 import pytest
 
 TOKEN = 'correct-horse-battery-staple-123'

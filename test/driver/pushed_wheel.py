@@ -90,9 +90,8 @@ class PushedWheel(EvdevDevice):
     def __init__(self, motor: Motor | None, limits: ForceLimits | None = None) -> None:
         device_map = load_device_map('logitech_g29')
         super().__init__((device_map,), directory=Path(gettempdir()) / 'no devices')
-        assert device_map.evdev is not None
-        self.device_map, self.layout = device_map, device_map.evdev.layout()
-        self.decoder = EventDecoder(device_map.evdev.gear)
+        self.device_map, self.layout = device_map, device_map.file.layout('evdev')
+        self.decoder = EventDecoder(self.layout.gear)
         self.motor = motor
         self.limits = limits or device_map.force
 

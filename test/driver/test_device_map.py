@@ -69,9 +69,7 @@ def test_controls_are_demanded_as_well_as_names() -> None:
 @pytest.mark.parametrize('name', WHEELS)
 def test_wheel_endpoints(name: str) -> None:
     """Raw 0 is full left (450 degrees), 65535 full right; pedals rest at 255 and end at 0."""
-    bindings = load_device_map(name).evdev
-    assert bindings is not None
-    layout = bindings.layout(WHEEL_LIMITS)
+    layout = load_device_map(name).file.layout('evdev', WHEEL_LIMITS)
     gas, brake = {'logitech_g923_xbox': (ecodes.ABS_Y, ecodes.ABS_Z)}.get(
         name, (ecodes.ABS_Z, ecodes.ABS_RZ))
     rest = {ecodes.ABS_X: 32767.5, ecodes.ABS_Y: 255, ecodes.ABS_Z: 255, ecodes.ABS_RZ: 255}
@@ -87,27 +85,25 @@ def test_wheel_endpoints(name: str) -> None:
 def test_evdev_and_joy_agree(name: str, limits: dict[int, tuple[float, float]]) -> None:
     """A device gives the same commands through evdev and through a joy node."""
     device = load_device_map(name)
-    assert device.evdev is not None and device.joy is not None
     for share in [i / 20 for i in range(21)]:
         axes = {code: low + ((share + 0.37 * code) % 1.0) * (high - low)
                 for code, (low, high) in limits.items()}
         joy = joy_state(axes, (), limits, ())
-        by_joy = normalize(RawInput(dict(enumerate(joy.axes))), device.joy.layout())
-        by_evdev = normalize(RawInput(axes), device.evdev.layout(limits))
+        by_joy = normalize(RawInput(dict(enumerate(joy.axes))), device.file.layout('joy'))
+        by_evdev = normalize(RawInput(axes), device.file.layout('evdev', limits))
         assert by_joy == pytest.approx(by_evdev, abs=1e-9)
 
 
 def test_gear_buttons_agree_in_evdev_and_joy() -> None:
     """The joy index of a button is its place among the device's buttons."""
-    g29 = load_device_map('logitech_g29')
-    assert g29.evdev is not None and g29.joy is not None
+    g29 = load_device_map('logitech_g29').file
     buttons = [*range(ecodes.BTN_TRIGGER, ecodes.BTN_DEAD + 1),
                *range(ecodes.BTN_TRIGGER_HAPPY1, ecodes.BTN_TRIGGER_HAPPY9 + 1)]
     for action in ('on', 'off', 'held'):
-        codes = getattr(g29.evdev.gear, action)
+        codes = getattr(g29.layout('evdev').gear, action)
         joy = joy_state({}, codes, {}, buttons)
         assert {i for i, value in enumerate(joy.buttons) if value} == getattr(
-            g29.joy.gear, action) != set()
+            g29.layout('joy').gear, action) != set()
 
 
 def test_keyboard_has_the_papers_keys() -> None:
@@ -145,8 +141,7 @@ def test_combined_pedals_are_read(tmp_path: Path) -> None:
     """One axis serves both pedals, with the device's ranges."""
     device = parse_device_map(COMBINED, tmp_path)
     assert (device.name, device.kind) == ('old', DeviceKind.WHEEL)
-    assert device.evdev is not None
-    layout = device.evdev.layout({ecodes.ABS_WHEEL: (0, 100), ecodes.ABS_GAS: (-50, 50)})
+    layout = device.file.layout('evdev', {ecodes.ABS_WHEEL: (0, 100), ecodes.ABS_GAS: (-50, 50)})
     raw = RawInput({ecodes.ABS_WHEEL: 55, ecodes.ABS_GAS: 25})
     assert normalize(raw, layout) == (0.0, 0.5, 0.0, False, 0, False)
     assert layout.gear.toggle == {ecodes.BTN_A}
@@ -195,7 +190,7 @@ def test_maps_of_another_directory(tmp_path: Path) -> None:
     """A user's folder is read the same way."""
     (tmp_path / 'old.yaml').write_text(COMBINED, encoding='utf-8')
     maps: tuple[DeviceMap, ...] = load_device_maps(tmp_path)
-    assert [m.title for m in maps] == ['Old wheel']
+    assert [m.file.title for m in maps] == ['Old wheel']
 
 
 def test_the_documented_example_is_the_g29(tmp_path: Path) -> None:
@@ -204,5 +199,5 @@ def test_the_documented_example_is_the_g29(tmp_path: Path) -> None:
     block = next(b for b in text.split('```yaml')[1:] if b.startswith('\ntitle:'))
     device = parse_device_map(block.split('```')[0], tmp_path)
     g29 = load_device_map('logitech_g29')
-    assert device.evdev is not None and g29.evdev is not None
-    assert device.evdev.layout(WHEEL_LIMITS).ranges == g29.evdev.layout(WHEEL_LIMITS).ranges
+    assert device.file.layout('evdev', WHEEL_LIMITS).ranges \
+        == g29.file.layout('evdev', WHEEL_LIMITS).ranges

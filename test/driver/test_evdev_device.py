@@ -40,11 +40,11 @@ def absent(tmp_path: Path, name: str) -> EvdevDevice:
     device_map = load_device_map(name)
     device = EvdevDevice((device_map,), directory=tmp_path / 'none')
     device.device_map = device_map
-    if device_map.evdev is not None:
-        device.layout = device_map.evdev.layout()
-        device.decoder = EventDecoder(device_map.evdev.gear)
-    elif device_map.keys is not None:
+    if device_map.keys is not None:
         device.decoder = EventDecoder(GearButtons(toggle=device_map.keys.reverse))
+    else:
+        device.layout = device_map.file.layout('evdev')
+        device.decoder = EventDecoder(device.layout.gear)
     return device
 
 

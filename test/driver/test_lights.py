@@ -7,11 +7,11 @@ from pathlib import Path
 
 from crgame_ros.cockpit.page_messages import parse_message
 from crgame_ros.cockpit.seat_table import HeldSeat
-from crgame_ros.driver.device_map import DeviceKind, load_device_maps
+from crgame_ros.driver.device_map import load_device_maps
 from crgame_ros.driver.source import JoyDriver, ReplayDriver, ScriptedDriver
 from crgame_ros.driver.timeline import parse_timeline, timeline_text
 from crgame_ros.driver.watchdog import SeatWatchdog
-from crgame_ros.driver.wheel import IndicatorLever, LightButtons
+from crgame_ros.driver.wheel import GearButtons, IndicatorLever, LightButtons
 from crgame_ros.errors import InputError
 from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.lights import HAZARD, Light, lights_of, signals_document
@@ -115,17 +115,19 @@ def test_an_unknown_key_is_refused_with_the_known_ones() -> None:
 def test_every_shipped_map_has_indicators_and_horn() -> None:
     """Each map has all four functions, each once, and on no button that changes the gear."""
     for device_map in load_device_maps():
-        layouts = [device_map.keys] if device_map.keys is not None \
-            else [device_map.evdev, device_map.joy]
-        for layout in layouts:
-            assert layout is not None
-            groups = [*vars(layout.lights).values()]
+        keys, buttons = device_map.keys, device_map.file.buttons
+        functions: list[tuple[LightButtons, GearButtons | None]] = \
+            [(keys.lights, None)] if keys is not None else []
+        if buttons is not None:
+            functions += [(buttons.lights('evdev'), buttons.gears('evdev')),
+                          (buttons.lights('joy'), buttons.gears('joy'))]
+        assert functions
+        for lights, gear_buttons in functions:
+            groups = [*vars(lights).values()]
             assert all(groups), device_map.name
-            if device_map.kind is not DeviceKind.KEYBOARD:
-                gear = vars(layout.gear).values()  # type: ignore[union-attr]
+            if gear_buttons is not None:
+                gear = vars(gear_buttons).values()
                 assert len(frozenset().union(*groups, *gear)) == sum(map(len, [*groups, *gear]))
-            else:
-                assert not frozenset().union(*groups) & layout.codes  # type: ignore[union-attr]
 
 
 def test_a_joy_node_works_the_lever() -> None:

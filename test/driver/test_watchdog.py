@@ -4,9 +4,9 @@
 
 import math
 
-from crgame_ros.driver.watchdog import SeatWatchdog, WatchdogParameters
-from crgame_ros.errors import InputError
+from crgame_ros.driver.watchdog import GENTLE_BRAKE, SeatWatchdog, TIMEOUT_S
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
+from crgame_ros.vehicle.state import REST
 import pytest
 
 DT_S = 0.01
@@ -128,10 +128,6 @@ def test_a_reset_begins_released() -> None:
     assert watchdog.losses == 1
 
 
-@pytest.mark.parametrize('wrong', [
-    {'timeout_s': 0.0}, {'gentle_brake': 1.5}, {'gentle_brake': -0.1}, {'brake_rate': math.nan},
-    {'pedal_release_rate': math.inf}, {'standstill_speed': 0.0}])
-def test_wrong_parameters_are_refused(wrong: dict[str, float]) -> None:
-    """The message names each wrong parameter."""
-    with pytest.raises(InputError, match=next(iter(wrong))):
-        WatchdogParameters(**wrong)
+def test_the_values_bring_a_vehicle_to_a_stop() -> None:
+    """All are above 0, and the pedal at most 1."""
+    assert 0.0 < TIMEOUT_S < math.inf and 0.0 < GENTLE_BRAKE <= 1.0 and 0.0 < REST < math.inf

@@ -4,8 +4,8 @@
 
 import math
 
+from crgame_ros.driver.device_map import EvdevAxis
 from crgame_ros.driver.wheel import (
-    AxisBinding,
     AxisRange,
     ControlLayout,
     GearButtons,
@@ -111,22 +111,22 @@ def test_joy_is_ordered_and_signed_like_the_joy_node() -> None:
     assert state.buttons == (0, 1, 1)
 
 
-@pytest.mark.parametrize(('binding', 'reported_range', 'message'), [
-    (AxisBinding(2, 0.0, 255.0, None, True, False, 0.0), (0.0, 1023.0), 'reports 0 to 1023'),
-    (AxisBinding(2, 0.0, 255.0, None, True, False, 0.0), (0.0, 127.0), 'reports 0 to 127'),
-    (AxisBinding(2, None, None, None, True, False, 0.0), None, 'has the range None to None'),
-    (AxisBinding(2, None, None, 300.0, True, False, 0.0), (0.0, 255.0), 'rests at 300'),
+@pytest.mark.parametrize(('axis', 'reported_range', 'message'), [
+    (EvdevAxis(axis=2, min=0.0, max=255.0, inverted=True), (0.0, 1023.0), 'reports 0 to 1023'),
+    (EvdevAxis(axis=2, min=0.0, max=255.0, inverted=True), (0.0, 127.0), 'reports 0 to 127'),
+    (EvdevAxis(axis=2, inverted=True), None, 'has the range None to None'),
+    (EvdevAxis(axis=2, rest=300.0, inverted=True), (0.0, 255.0), 'rests at 300'),
 ])
 def test_a_map_that_does_not_fit_the_device_is_refused(
-        binding: AxisBinding, reported_range: tuple[float, float] | None, message: str) -> None:
+        axis: EvdevAxis, reported_range: tuple[float, float] | None, message: str) -> None:
     """A pedal of 0..1023 read as 0..255 would be wrong everywhere, so it is refused."""
     with pytest.raises(InputError, match=message):
-        binding.range(reported_range)
+        axis.range(False, 0.0, reported_range)
 
 
-def test_a_binding_takes_the_devices_range() -> None:
+def test_an_axis_takes_the_devices_range() -> None:
     """Without limits in the map the device's limits hold, and the rest position follows."""
-    pedal = AxisBinding(2, None, None, None, True, False, 0.0).range((0.0, 1023.0))
-    stick = AxisBinding(0, None, None, None, True, True, 0.0).range((-32768.0, 32767.0))
+    pedal = EvdevAxis(axis=2, inverted=True).range(False, 0.0, (0.0, 1023.0))
+    stick = EvdevAxis(axis=0, inverted=True).range(True, 0.0, (-32768.0, 32767.0))
     assert (pedal.minimum, pedal.maximum, pedal.rest) == (0.0, 1023.0, 1023.0)
     assert stick.rest == -0.5

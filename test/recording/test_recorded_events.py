@@ -44,7 +44,7 @@ def test_events_are_read_back(tmp_path: Path, recorder: Any) -> None:
     assert [event.name for event in first.fired] == ['leader-brakes', 'pedestrian', 'roadworks']
     assert read_run_events(bag).fired == ()
     assert read_run_events(bag).known == {event.name for event in first.setup.game.events}
-    with pytest.raises(InputError, match='no such run'):
+    with pytest.raises(InputError, match='no epoch 2 in it'):
         read_run_events(bag, 2)
 
 
@@ -62,6 +62,26 @@ def test_recording_repeats_with_its_events(tmp_path: Path, recorder: Any) -> Non
     assert again.state_hash == original.state_hash
     assert again.object_poses.tobytes() == original.object_poses.tobytes()
     assert play(()).object_poses.tobytes() != original.object_poses.tobytes()
+
+
+@pytest.mark.parametrize('triggers', (((120, 'pedestrian'),), ()))
+def test_the_last_of_two_simulations_repeats_with_its_own_events(
+        tmp_path: Path, recorder: Any, triggers: Sequence[tuple[int, str]]) -> None:
+    """A simulation that was started again counts its runs from 0: the last run is that of all."""
+    log_ns, step_ns = 1_700_000_000_000_000_000, 9_000_000_000
+    before, last = play(), play(triggers)
+    recorder.ours(tmp_path / 'bag', [
+        *recorder.messages(before),
+        *recorder.messages(before, epoch=1, offset_ns=step_ns, log_ns=log_ns + step_ns),
+        *recorder.messages(last, log_ns=log_ns + 2 * step_ns)])
+    assert read_run_events(tmp_path / 'bag').fired == last.fired
+    game = replace(load_game(CROSSING), base=tmp_path)
+    human = replace(game.humans[0], driver='replay:bag')
+    setup = with_replayed_events(build_setup(replace(game, humans=(human,))))
+    drivers, intervals_s = recorded_inputs(setup)
+    again = run_offline(setup, duration_s=3.0, drivers=drivers, intervals_s=intervals_s)
+    assert again.state_hash == last.state_hash
+    assert again.object_poses.tobytes() == last.object_poses.tobytes()
 
 
 def test_game_without_a_replay_keeps_its_events() -> None:

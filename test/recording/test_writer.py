@@ -4,6 +4,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+import json
 import os
 from pathlib import Path
 import subprocess
@@ -15,7 +16,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.paths import share_directory
 from crgame_ros.recording.exceptions import RecordingError
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.schemas import schema_text, type_hash
+from crgame_ros.recording.schemas import type_schema
 from crgame_ros.recording.writer import BagWriter, FLUSH_INTERVAL_NS, TopicQos
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -81,7 +82,7 @@ def test_metadata_is_that_of_rosbag2_version_9(tmp_path: Path, samples: Any) -> 
         'starting_time': {'nanoseconds_since_epoch': 5_000_000_000},
         'duration': {'nanoseconds': 490_000_000}}]
     topic = info['topics_with_message_count'][0]['topic_metadata']
-    assert topic['type_description_hash'] == type_hash(STRING)
+    assert topic['type_description_hash'] == type_schema(STRING)[1]
     infinite = {'sec': 9223372036, 'nsec': 854775807}
     assert topic['offered_qos_profiles'] == [{
         'history': 'keep_last', 'depth': 1, 'reliability': 'reliable',
@@ -112,14 +113,21 @@ def test_mcap_and_its_ros2_decoder_read_the_file(tmp_path: Path, samples: Any) -
 
 
 @pytest.mark.parametrize('type_name', recorded_types())
-def test_schema_and_hash_agree_with_another_library(type_name: str, samples: Any) -> None:
-    """Rosbags parses our text to its own definitions and computes the same hash from them."""
-    found = get_types_from_msg(schema_text(type_name), type_name)
+def test_schema_and_hash_agree_with_the_installed_packages(type_name: str, samples: Any) -> None:
+    """The text holds the type's own definitions, the hash is that in ROS's own files."""
+    text, digest = type_schema(type_name)
+    found = get_types_from_msg(text, type_name)
     assert type_name in found
     for name, (constants, fields) in found.items():
         assert fields == samples.store.fielddefs[name][1]
         assert len(constants) == len(samples.store.fielddefs[name][0])
-    assert type_hash(type_name) == samples.store.hash_rihs01(type_name)
+    package, name = type_name.split('/msg/')
+    places = [Path(prefix) / 'share' / package / 'msg' / f'{name}.json' for prefix in (
+        *filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)), sys.prefix)]
+    path = next(place for place in places if place.is_file())
+    hashes = {entry['type_name']: entry['hash_string']
+              for entry in json.loads(path.read_text('utf-8'))['type_hashes']}
+    assert digest == hashes[type_name]
 
 
 @pytest.mark.parametrize('type_name', [
@@ -129,20 +137,6 @@ def test_unknown_type_is_refused(tmp_path: Path, type_name: str) -> None:
     with BagWriter(tmp_path / 'run', now_ns=time.monotonic_ns) as writer:
         with pytest.raises(InputError, match=type_name):
             writer.add_topic('/x', type_name, STREAM)
-
-
-def test_types_are_found_on_the_ament_prefix_path(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bounds, arrays, constants, comments are no types."""
-    folder = tmp_path / 'share' / 'my_msgs' / 'msg'
-    folder.mkdir(parents=True)
-    (folder / 'Pair.msg').write_text(
-        '# std_msgs/Bool is not used\nint8 MOST=3\nstring<=5[<=2] names\nInner[2] inner\n')
-    (folder / 'Inner.msg').write_text('builtin_interfaces/Time at  # time\nfloat64 x 1.5\n')
-    monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path))
-    text = schema_text('my_msgs/msg/Pair')
-    assert [line for line in text.splitlines() if line.startswith('MSG:')] == [
-        'MSG: my_msgs/Inner', 'MSG: builtin_interfaces/Time']
 
 
 def test_chosen_publish_time_is_kept(tmp_path: Path, samples: Any) -> None:

@@ -56,8 +56,8 @@ def test_the_file_of_parameters_lists_every_one(project_root: Path) -> None:
         if path.stem == 'sim_node':
             source += (nodes / 'sim' / 'control.py').read_text()
         declared = set(re.findall(
-            r"(?:declare_parameter|declare|text|flag)\(\s*'([a-z_]+)'", source))
-        declared |= set(re.findall(r"declare_number\(\s*self(?:\._node)?,\s*'([a-z_]+)'",
+            r"(?:declare_parameter|declare)\(\s*'([a-z_]+)'", source))
+        declared |= set(re.findall(r"(?:declare_number|fixed)\(\s*self(?:\._node)?,\s*'([a-z_]+)'",
                                    source))
         if 'OPTIONS.items()' in source:
             declared |= {name for name, _ in OPTIONS.values()}

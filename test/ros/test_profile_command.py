@@ -23,7 +23,11 @@ def test_a_shell_gets_the_profile_and_others_the_same(
     assert 'profile_name="/exp1/clock"' in text and 'profile_name="/exp1/trigger"' in text
     assert main(['dds-profile', str(file), '--namespace', '/exp1']) == 0
     assert (capsys.readouterr().out, file.read_text()) == (first, text)
+    assert main(['dds-profile', str(file), '--namespace', 'exp1']) == 0
+    assert (capsys.readouterr().out, file.read_text()) == (first, text)
     assert list(file.parent.iterdir()) == [file]
+    assert main(['dds-profile', str(file), '--namespace', 'no name']) == 2
+    assert 'is no namespace' in capsys.readouterr().err
 
 
 def test_what_cannot_be_is_refused_in_a_line(

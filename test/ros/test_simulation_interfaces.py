@@ -29,6 +29,7 @@ import numpy as np
 import pytest
 import rclpy
 from rclpy.context import Context
+from rclpy.parameter import Parameter
 from ros_domains import own_domain_id
 import shapely
 from standard_messages import PARTS, stand_in_modules, StandIn, use_stand_ins
@@ -120,6 +121,19 @@ def desk(simulation: Simulation, monkeypatch: pytest.MonkeyPatch) -> Iterator[De
     yield Desk(node, simulation, package)
     node.destroy_node()
     context.try_shutdown()
+
+
+def test_parameters_that_are_refused_together_choose_nothing(desk: Desk) -> None:
+    """A scenario that comes with an unusable factor is not what the next reset loads."""
+    node = desk.interfaces._node
+    assert desk.control.choice == ('game', '')
+    for factor, chosen in (('fast', 'game'), (2.0, 'scenario')):
+        done = node.set_parameters_atomically([
+            Parameter('scenario', value='ZAM_CutIn-1_1_T-1'),
+            Parameter('real_time_factor', value=factor)])
+        assert done.successful is (chosen == 'scenario')
+        assert desk.control.choice[0] == chosen
+    assert desk.control.choice[1] == 'ZAM_CutIn-1_1_T-1'
 
 
 def test_stand_ins_have_the_fields_of_the_real_messages() -> None:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Steps of the world are put together in order, also if half of one is lost or late."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 import time
 
 from crgame_ros.game.documents import GAME, OBJECTS
@@ -10,7 +10,7 @@ from crgame_ros.game.game import load_game
 from crgame_ros.messages.joints import object_joint_names, vehicle_joint_names
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import StateMessage
-from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
+from crgame_ros.ros.scenario_documents import DocumentCollector, KINDS, ScenarioSet
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
 from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup
@@ -20,6 +20,7 @@ import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
+from std_msgs.msg import String
 
 STATES = '/vehicles/tick_state'
 
@@ -52,17 +53,23 @@ class Stage:
                                     for name in vehicle_joint_names(item.id)])
         self._object = StateMessage([name for item in scenario.others
                                      for name in object_joint_names(item.id)])
-        self._follower = WorldFollower(endpoints, STATES)
-        self._follower.begin(scenario)
+        self.follower = WorldFollower(endpoints, STATES)
+        self.follower.follow(scenario)
+        self._documents = {kind: endpoints.publisher(f'/scenario/{kind}') for kind in KINDS}
         self.steps: list[WorldStep] = []
-        self._wait(lambda: all(item.get_subscription_count() == 1
+        self.wait(lambda: all(item.get_subscription_count() == 1
                                for item in (self._states, self._objects)))
 
-    def _wait(self, condition: Callable[[], bool]) -> None:
+    def wait(self, condition: Callable[[], bool]) -> None:
         until_s = time.monotonic() + PATIENCE_S
         while not condition():
             assert time.monotonic() < until_s
             time.sleep(0.01)
+
+    def documents(self, texts: Mapping[str, str]) -> None:
+        """Publish a game's documents."""
+        for kind, text in texts.items():
+            self._documents[kind].publish(String(data=text))
 
     def state(self, k: int) -> None:
         """Publish the vehicles' places at tick k."""
@@ -77,14 +84,14 @@ class Stage:
 
     def follow(self, count: int) -> list[tuple[int, float]]:
         """Wait for so many steps in all, and return tick and objects of each."""
-        self._wait(lambda: len(self.take()) >= count)
+        self.wait(lambda: len(self.take()) >= count)
         time.sleep(0.1)
         return [(step.n // self._scheduler.steps_per_tick, float(step.objects.poses[0, 0]))
                 for step in self.take()]
 
     def take(self) -> list[WorldStep]:
         """Receive the complete steps."""
-        self.steps += self._follower.steps()
+        self.steps += self.follower.steps()
         return self.steps
 
     def close(self) -> None:
@@ -142,3 +149,43 @@ def test_a_run_that_goes_on_far_ahead_is_followed_without_a_gap(stage: Stage) ->
         stage.objects(k)
         stage.state(k)
     assert [k for k, _ in stage.follow(6)] == [0, 1, 100, 101, 102, 103]
+
+
+def test_a_run_that_is_played_again_begins_before_its_steps(stage: Stage) -> None:
+    begun: list[int] = []
+    stage.follower.begin = lambda: begun.append(len(stage.steps))
+    for k in (100, 101, 102):
+        stage.objects(k)
+        stage.state(k)
+    stage.follow(3)
+    assert begun == []
+    # The first ones could be errors: time runs back where three agree.
+    for k in (0, 1, 2):
+        stage.state(k)
+    stage.wait(lambda: len(stage.take()) == 3 and len(begun) > 0)
+    for k in (2, 3):
+        stage.objects(k)
+    stage.state(3)
+    assert [k for k, _ in stage.follow(5)] == [100, 101, 102, 2, 3]
+    assert begun == [3]
+
+
+def test_a_game_begins_once_with_its_documents(stage: Stage, scenario: ScenarioSet) -> None:
+    """States that came before them are kept: those of a run begin with it."""
+    follower = stage.follower
+    begun: list[ScenarioSet | None] = []
+    follower.scenario, follower.begin = None, lambda: begun.append(follower.scenario)
+    stage.objects(0)
+    stage.state(0)
+    time.sleep(0.2)
+    assert stage.take() == [] and begun == []
+    stage.documents(scenario.texts)
+
+    def looked() -> bool:
+        follower.look()
+        return bool(begun)
+
+    stage.wait(looked)
+    follower.look()
+    assert len(begun) == 1 and begun[0] is follower.scenario is not None
+    assert [k for k, _ in stage.follow(1)] == [0]

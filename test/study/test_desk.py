@@ -4,14 +4,17 @@
 
 import asyncio
 import json
+import logging
 from pathlib import Path
 import random
 import sys
 
 from aiohttp import ClientSession, CookieJar, WSMsgType, WSServerHandshakeError
+from crgame_ros.cockpit.client import Client
+from crgame_ros.cockpit.page_socket import MAX_MALFORMED, PageSocket
 from crgame_ros.study.desk.pages import words_of
 from crgame_ros.study.desk.participant_document import experimenter_document
-from crgame_ros.study.desk.server import MAX_MALFORMED, MAX_PAGES
+from crgame_ros.study.desk.server import LINKS, MAX_PAGES
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -266,6 +269,41 @@ async def test_only_the_printed_link_makes_an_experimenter(tmp_path: Path) -> No
                 other.get(running.experimenter) as answer:
             assert answer.status == 403 and 'not good any more' in await answer.text()
         await director.close()
+
+
+@in_loop
+async def test_a_link_that_cannot_be_saved_is_refused_in_a_sentence_and_stays(
+        tmp_path: Path) -> None:
+    async with served(tmp_path) as running:
+        links = tmp_path / LINKS
+        links.rename(tmp_path / 'aside')
+        links.mkdir()
+        async with running.http.get(running.experimenter) as answer:
+            text = await answer.text()
+            assert answer.status == 500 and text.count('\n') == 1, text
+            assert 'Server got itself in trouble' not in text and str(tmp_path) not in text
+        links.rmdir()
+        await (await running.direct()).close()
+
+
+@in_loop
+async def test_a_page_to_which_nothing_can_be_sent_is_told_in_the_log(tmp_path: Path) -> None:
+    """What nobody has foreseen would else leave no trace."""
+    said: list[object] = []
+
+    async def fail(*_: object) -> None:
+        raise RuntimeError('unforeseen')
+
+    async with served(tmp_path) as running:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(Client, '_send', fail)
+            patch.setattr(logging.getLogger(PageSocket.__module__), 'error',
+                          lambda text, *parts, **_: said.append(text % parts))
+            page = await running.join()
+            async with asyncio.timeout(PATIENCE_S):
+                while (await page.receive()).type is not WSMsgType.CLOSED:
+                    pass
+    assert said == ['cannot send to participant 1']
 
 
 @in_loop

@@ -9,7 +9,8 @@ from crgame_ros.analysis.report.file import write_report
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.game.game import Game
 from crgame_ros.recording.export import write_scenario
-from crgame_ros.recording.offline_recording import GAME_FILE, write_recording
+from crgame_ros.recording.offline_recording import write_recording
+from crgame_ros.recording.run_folder import GAME_FILE
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.whole_file import write_text
 

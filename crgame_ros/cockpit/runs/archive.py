@@ -14,17 +14,23 @@ from crgame_ros.cockpit.page_messages import clean_text
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import load_game
 from crgame_ros.recording.metadata import METADATA_FILE
-from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, run_folder, run_folders
+from crgame_ros.recording.run_folder import (
+    BAG,
+    bags_of,
+    CLAIM,
+    FINISHED_MARK,
+    GAME_FILE,
+    is_closed,
+    run_folder,
+    run_folders,
+)
 
 MAX_RUNS = 500
 MAX_TITLE = 80
-GAME = 'game.yaml'
-# The file that exists while the processes of a session are alive or after they were killed.
-CLAIM = '.started'
 PICTURE = '.picture.svg'
 _TIMES = re.compile(r'nanoseconds(?:_since_epoch)?: (\d{1,19})')
 # Patterns of a run's files: its game, its recordings and the files made from them.
-RUN_FILES = ('game.yaml', 'bag*', '*.xml', 'timing*.json', 'report*.html')
+RUN_FILES = (GAME_FILE, 'bag*', '*.xml', 'timing*.json', 'report*.html')
 
 
 @dataclass(frozen=True)
@@ -49,13 +55,12 @@ class PastRun:
     @property
     def bag(self) -> Path:
         """Return the path of its first recording."""
-        return self.folder / 'bag'
+        return self.folder / BAG
 
     @property
     def is_closed(self) -> bool:
         """Return whether its last recording has been closed, so that it can be read whole."""
-        bags = bags_of(self.folder)
-        return bool(bags) and (bags[-1] / METADATA_FILE).is_file()
+        return is_closed(self.folder)
 
     @property
     def is_finished(self) -> bool:
@@ -150,14 +155,14 @@ class RunArchive:
                       default=0)
         key = (run.folder, changed)
         if key not in self._told:
-            self._told[key] = {**_game_facts(run.folder / GAME), **_bag_facts(metadata),
+            self._told[key] = {**_game_facts(run.folder / GAME_FILE), **_bag_facts(metadata),
                                'contacts': _contacts(timing)}
         return self._told[key]
 
 
 def _is_run(folder: Path) -> bool:
     """Return whether a folder holds a run that this program has recorded."""
-    return (folder / GAME).is_file() and (folder / 'bag').is_dir() and not folder.is_symlink()
+    return (folder / GAME_FILE).is_file() and (folder / BAG).is_dir() and not folder.is_symlink()
 
 
 def _plain_files(path: Path) -> Iterator[Path]:
@@ -210,7 +215,7 @@ def _contacts(path: Path) -> int | None:
 
 def _remove(run: PastRun) -> None:
     """Remove a run's files; until the last is gone, the run is listed and can be deleted again."""
-    game = run.folder / GAME
+    game = run.folder / GAME_FILE
     own = [path for path in run.files().values() if path != game]
     for path in (*own, run.folder / PICTURE, run.folder / FINISHED_MARK, game):
         path.unlink(missing_ok=True)

@@ -14,8 +14,9 @@ from crgame_ros.analysis.scores.nuplan import NuplanScore, WEIGHTS
 from crgame_ros.analysis.scores.run_scores import scores_of
 from crgame_ros.analysis.scores.vehicle import SCORE_MEASURES
 from crgame_ros.cockpit.job_process import serve_jobs
-from crgame_ros.recording.run_record import read_run_record
-from crgame_ros.recording.run_trajectories import RunTrajectories
+from crgame_ros.recording.run_record import read_run_record, RunRecord
+from crgame_ros.recording.run_trajectories import read_trajectories
+from crgame_ros.vehicle.state import StateColumn
 from crgame_ros.whole_file import write_text
 import numpy as np
 
@@ -43,7 +44,7 @@ def score(path: Path) -> dict[str, object]:
     scores = scores_of(record, {}, drives_only=True)
     return {'vehicles': [
         {'vehicle': each.vehicle_id, 'role': each.role, **_score_values(each.nuplan),
-         **_motion(record.log, number), 'remarks': list(each.remarks)}
+         **_motion(record, number), 'remarks': list(each.remarks)}
         for number, each in enumerate(scores.vehicles)], 'refusal': scores.refusal}
 
 
@@ -55,7 +56,7 @@ def picture(path: Path, out: str) -> dict[str, object]:
     :param out: the file to write, SVG.
     :raises InputError: if it cannot be read.
     """
-    log = read_run_record(path).log
+    log = read_trajectories(path)
     scene = FrameScene(log)
     last = int(log.ks[-1])
     spread = range(0, len(log.ks), max(1, len(log.ks) // 20))
@@ -92,13 +93,11 @@ def _score_values(found: NuplanScore | None) -> dict[str, object]:
          'definition': SCORE_MEASURES[name].definition} for name, value, weight in parts]}
 
 
-def _motion(log: RunTrajectories, number: int) -> dict[str, object]:
-    """Return the distance and the speeds of a vehicle [m, m/s]."""
-    states = log.vehicle_states[:, number]
-    states = states[np.isfinite(states[:, 0])]
-    ways = np.hypot(*np.diff(states[:, :2], axis=0).T)
-    return {'distance': _number(float(ways.sum())),
-            'fastest': _number(float(np.abs(states[:, 3]).max(initial=0.0)))}
+def _motion(record: RunRecord, number: int) -> dict[str, object]:
+    """Return the distance and the greatest speed of a vehicle [m, m/s]."""
+    speeds = record.log.vehicle_states[:, number, StateColumn.SPEED]
+    return {'distance': _number(float(record.ways()[number])),
+            'fastest': _number(float(np.nanmax(np.abs(speeds), initial=0.0)))}
 
 
 def _number(value: float) -> float | None:

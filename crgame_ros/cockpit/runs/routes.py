@@ -104,6 +104,7 @@ class RunReplays:
         async with self._starting:
             found = self._replays.get(run.id)
             if found is None or found.process.returncode is not None:
+                await self.end(run.id)
                 while len(self._replays) >= MOST_REPLAYS:
                     await self.end(next(iter(self._replays)))
                 found = self._replays[run.id] = await _start(run)

@@ -16,7 +16,7 @@ from crgame_ros.game.game import Game, HumanSpec, load_game
 from crgame_ros.game.seat_documents import SeatOccupant
 from crgame_ros.paths import default_game, scenarios_directory
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.number_parameters import declare_number
+from crgame_ros.ros.number_parameters import declare_number, fixed
 from crgame_ros.ros.run_ends import AT_END, EXIT, STAY, STAY_IF_CHOSEN
 from crgame_ros.timing.time_controller import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
@@ -113,90 +113,49 @@ class SimControl:
             description='game file; taken at the start and at a reset'))
         declare('scenario', '', ParameterDescriptor(
             description='CommonRoad file instead of a game; taken at the start and at a reset'))
-        declare('scenario_directories', [''], ParameterDescriptor(
-            description='directories from which a later game or scenario may come',
-            read_only=True))
+        fixed(self._node, 'scenario_directories', [''],
+              'directories from which a later game or scenario may come')
         declare_number(self._node, 'real_time_factor', 1.0, 'simulated seconds per wall second',
                        (MIN_REAL_TIME_FACTOR, MAX_REAL_TIME_FACTOR), read_only=False)
-        declare_number(self._node, 'duration', 0.0,
-                       "simulated seconds until the run ends; 0 takes the game's", (0.0, 1e7))
-        declare('start_paused', False, ParameterDescriptor(
-            description='wait for /sim/start, with each game anew', read_only=True))
-        declare_number(self._node, 'countdown', COUNTDOWN_S, 'seconds from when all drivers at '
-                       'pages are ready to the start of the run', (0.0, 60.0))
-        declare('realtime_priority', False, ParameterDescriptor(
-            description='run under SCHED_FIFO where the system allows it', read_only=True))
-        declare('wait_for', [''], ParameterDescriptor(
-            description='companion nodes that must be connected before the run starts',
-            read_only=True))
-        declare('roster', '', ParameterDescriptor(
-            description='file that tells the launcher which vehicles the game has; none if empty',
-            read_only=True))
-        declare('folder', '', ParameterDescriptor(
-            description="folder of the run's files, in which later runs get their own; each "
-            'later game is written there; none if empty', read_only=True))
-        declare('at_end', EXIT, ParameterDescriptor(
-            description='what follows the end of a run: exit, stay until a reset or a signal, or '
-            'stay-if-chosen: exit unless its game was chosen after the start', read_only=True))
-        declare_number(self._node, 'planner_timeout', 10.0,
-                       'seconds to wait for planners and companions at the start', (0.0, 1e4))
-
-        if self._value('at_end') not in AT_END:
-            raise InputError(f'is "{str(self._value("at_end"))[:40]}"', 'parameter at_end',
+        # From the command line [s]; 0 if none.
+        self.duration_s = declare_number(
+            self._node, 'duration', 0.0, "simulated seconds until the run ends; 0 takes the "
+            "game's", (0.0, 1e7))
+        self.starts_paused = fixed(self._node, 'start_paused', False,
+                                   'wait for /sim/start, with each game anew')
+        self.countdown_from_s = declare_number(
+            self._node, 'countdown', COUNTDOWN_S, 'seconds from when all drivers at pages are '
+            'ready to the start of the run', (0.0, 60.0))
+        self.wants_realtime_priority = fixed(self._node, 'realtime_priority', False,
+                                             'run under SCHED_FIFO where the system allows it')
+        self.companions = tuple(filter(None, fixed(
+            self._node, 'wait_for', [''],
+            'companion nodes that must be connected before the run starts')))
+        roster = fixed(self._node, 'roster', '', 'file that tells the launcher which vehicles the '
+                       'game has; none if empty')
+        self.roster = Path(roster) if roster else None
+        folder = fixed(self._node, 'folder', '', "folder of the run's files, in which later runs "
+                       'get their own; each later game is written there; none if empty')
+        self.folder = Path(folder) if folder else None
+        self._at_end = fixed(
+            self._node, 'at_end', EXIT, 'what follows the end of a run: exit, stay until a reset '
+            'or a signal, or stay-if-chosen: exit unless its game was chosen after the start')
+        self.planner_timeout_s = declare_number(
+            self._node, 'planner_timeout', 10.0,
+            'seconds to wait for planners and companions at the start', (0.0, 1e4))
+        if self._at_end not in AT_END:
+            raise InputError(f'is "{self._at_end[:40]}"', 'parameter at_end',
                              'give ' + ', '.join(AT_END))
 
     def _value(self, name: str) -> Any:
         return self._node.get_parameter(name).value
 
     @property
-    def duration_s(self) -> float:
-        """Return the duration from the command line [s]; 0 if none."""
-        return float(self._value('duration'))
-
-    @property
-    def countdown_from_s(self) -> float:
-        """Return the time from the readiness of all drivers at pages to the start [s]."""
-        return float(self._value('countdown'))
-
-    @property
-    def starts_paused(self) -> bool:
-        """Return whether the run waits for /sim/start."""
-        return bool(self._value('start_paused'))
-
-    @property
-    def wants_realtime_priority(self) -> bool:
-        """Return whether the user asked for SCHED_FIFO."""
-        return bool(self._value('realtime_priority'))
-
-    @property
-    def companions(self) -> tuple[str, ...]:
-        """Return the nodes that must be connected before the run starts."""
-        return tuple(item for item in self._value('wait_for') if item)
-
-    @property
-    def roster(self) -> Path | None:
-        """Return the file in which the launcher reads the vehicles of the game."""
-        value = self._value('roster')
-        return Path(value) if value else None
-
-    @property
-    def folder(self) -> Path | None:
-        """Return the folder of the run's files."""
-        value = self._value('folder')
-        return Path(value) if value else None
-
-    @property
     def stays(self) -> bool:
         """Return whether the node stays when a run has ended."""
-        at_end = self._value('at_end')
         if self.quit_wanted:
             return False
-        return at_end == STAY or (at_end == STAY_IF_CHOSEN and self.chosen_later)
-
-    @property
-    def planner_timeout_s(self) -> float:
-        """Return the time limit of the wait for planners and companions [s]."""
-        return float(self._value('planner_timeout'))
+        return self._at_end == STAY or (self._at_end == STAY_IF_CHOSEN and self.chosen_later)
 
     @property
     def stands_still(self) -> bool:
@@ -353,12 +312,14 @@ class SimControl:
                     self._allowed(str(parameter.value), parameter.name)
                 except InputError as error:
                     return SetParametersResult(successful=False, reason=str(error))
-                self._chosen = parameter.name
         return SetParametersResult(successful=True)
 
     def _after_parameters(self, parameters: list[Parameter]) -> None:
         for parameter in parameters:
-            self.chosen_anew |= parameter.name in ('game', 'scenario')
+            if parameter.name in ('game', 'scenario'):
+                self.chosen_anew = True
+                if parameter.value:
+                    self._chosen = parameter.name
             if parameter.name == 'real_time_factor':
                 self.real_time_factor = float(parameter.value)
 

@@ -19,6 +19,7 @@ from crgame_ros.analysis.tables.column import (
 from crgame_ros.analysis.tables.runs import RUNS
 from crgame_ros.analysis.tables.vehicles import VEHICLES
 from crgame_ros.errors import InputError
+from crgame_ros.recording.run_folder import GAME_FILE
 from crgame_ros.study.data.asked_questions import AskedQuestions
 from crgame_ros.study.data.conducted_study import ConductedStudy, ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.run_tables import RunTables
@@ -251,7 +252,7 @@ class TrialsTable:
         if folder is not None and folder.is_dir():
             row['recording'] = self._folder.relative(folder)
             for name, pattern in (('scenario', '*.xml'), ('report', 'report.html'),
-                                  ('game_file', 'game.yaml')):
+                                  ('game_file', GAME_FILE)):
                 found = sorted(folder.glob(pattern))
                 row[name] = self._folder.relative(found[0]) if found else None
         return row

@@ -5,22 +5,23 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
 import contextlib
-from functools import partial
 from itertools import count
 import json
 import logging
 from pathlib import Path
+from typing import cast
 from urllib.parse import urlsplit
 
-from aiohttp import hdrs, web, WSCloseCode, WSMsgType
+from aiohttp import hdrs, web, WSCloseCode
 from aiohttp.typedefs import Handler
 from crgame_ros.cockpit.access import Access, cookie_name, is_loopback
-from crgame_ros.cockpit.client import Client, TokenBucket
+from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.page_files import PageFile, read_files
+from crgame_ros.cockpit.page_socket import PageSocket
 from crgame_ros.cockpit.request_guard import (
     ACCESS,
-    COOKIE_S,
     Doorkeeper,
+    enter,
     file_answer,
     guard,
     header_writer,
@@ -31,37 +32,34 @@ from crgame_ros.cockpit.server import listen
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.paths import page_directory
 from crgame_ros.study.desk.desk import Desk
-from crgame_ros.study.desk.messages import MAX_BYTES, parse_experimenter, parse_participant
+from crgame_ros.study.desk.messages import (
+    ExperimenterMessage,
+    MAX_BYTES,
+    parse_experimenter,
+    parse_participant,
+    ParticipantMessage,
+)
 from crgame_ros.study.desk.page_markdown import consent_copy, picture
 from crgame_ros.study.desk.pages import DeskPages, TOLD_EVERY_S, words_of
 from crgame_ros.study.file import Page
 
 MESSAGES_PER_S, MESSAGE_BURST = 20.0, 60.0
-MAX_MALFORMED = 5
-HEARTBEAT_S = 5.0
-CLOSE_S = 0.4
 
 _log = logging.getLogger(__name__)
 
 
-class DeskSocket:
+class DeskSocket(PageSocket[ExperimenterMessage | ParticipantMessage]):
     """
-    Reads a page's messages; a page that sends malformed or too many messages is disconnected.
+    A connection of a page.
 
     :param pages: of the desk.
     :param experimenter: whether it is an experimenter's page.
     """
 
     def __init__(self, pages: DeskPages, *, experimenter: bool) -> None:
+        super().__init__(MAX_BYTES, MESSAGES_PER_S, MESSAGE_BURST)
         self._pages = pages
         self._is_experimenter = experimenter
-        self._bucket = TokenBucket(MESSAGES_PER_S, MESSAGE_BURST)
-        self._malformed = 0
-        self._transport: asyncio.WriteTransport | None = None
-        # Pings count as messages.
-        self.socket = web.WebSocketResponse(
-            timeout=CLOSE_S, heartbeat=HEARTBEAT_S, compress=False, autoping=False,
-            max_msg_size=MAX_BYTES + 1)
 
     async def run(self, request: web.Request, name: str) -> web.WebSocketResponse:
         """
@@ -70,72 +68,33 @@ class DeskSocket:
         :param request: the upgrade request.
         :param name: of the page, in the log.
         """
-        await self.socket.prepare(request)
-        transport = request.transport
-        if not isinstance(transport, asyncio.WriteTransport):
-            return self.socket
-        self._transport = transport
-        client = Client(name, name, transport.abort, transport.get_write_buffer_size)
-        writer = asyncio.create_task(client.write(self.socket))
-        writer.add_done_callback(lambda task: _end_with(task, client))
-        code: int = WSCloseCode.INTERNAL_ERROR
-        reason = ''
-        try:
-            self._pages.joined(client, experimenter=self._is_experimenter)
-            code, reason = await self._read(client)
-        finally:
-            self._pages.left(client)
-            writer.cancel()
-            if reason or client.dropped:
-                _log.info('%s was dropped: %s', client.id, reason or client.dropped)
-            await self.close(code, reason)
+        transport = await self.prepare(request)
+        if transport is not None:
+            await self.serve(Client(name, name, transport.abort, transport.get_write_buffer_size))
         return self.socket
 
-    async def close(self, code: int, reason: str) -> None:
-        """Close the connection within a second, even if the other end does not respond."""
-        with contextlib.suppress(TimeoutError, ConnectionError):
-            async with asyncio.timeout(2 * CLOSE_S):
-                await self.socket.close(code=code, message=reason.encode()[:123])
-        if self._transport is not None:
-            self._transport.abort()
+    def joined(self, client: Client) -> None:
+        """Add the page to those of the desk."""
+        self._pages.joined(client, experimenter=self._is_experimenter)
 
-    async def _read(self, client: Client) -> tuple[int, str]:
-        loop = asyncio.get_running_loop()
-        while True:
-            message = await self.socket.receive()
-            if message.type in (WSMsgType.CLOSE, WSMsgType.CLOSING, WSMsgType.CLOSED,
-                                WSMsgType.ERROR):
-                return WSCloseCode.OK, ''
-            if not self._bucket.try_spend(loop.time()):
-                return (WSCloseCode.POLICY_VIOLATION,
-                        f'more than {MESSAGES_PER_S:g} messages a second')
-            if message.type is WSMsgType.PING:
-                await self.socket.pong(message.data)
-            elif message.type is WSMsgType.TEXT:
-                self._handle(client, message.data)
-            elif message.type is WSMsgType.BINARY:
-                self._malformed += 1
-            if self._malformed >= MAX_MALFORMED:
-                return (WSCloseCode.POLICY_VIOLATION,
-                        f'{MAX_MALFORMED} messages that cannot be read')
+    def left(self, client: Client) -> None:
+        """Remove the page from them."""
+        self._pages.left(client)
 
-    def _handle(self, client: Client, text: str) -> None:
-        # It is read first: errors of what is done by it are no fault of the message.
-        try:
-            do = partial(self._pages.experimenter_says, client, parse_experimenter(text)) \
-                if self._is_experimenter \
-                else partial(self._pages.participant_says, client, parse_participant(text))
-        except InputError as error:
-            self._malformed += 1
-            _log.info('%s: %s', client.id, error)
-            return
-        do()
+    def parse(self, text: str) -> ExperimenterMessage | ParticipantMessage:
+        """Return the message in a text."""
+        return parse_experimenter(text) if self._is_experimenter else parse_participant(text)
 
+    async def act(self, client: Client, message: ExperimenterMessage | ParticipantMessage) -> None:
+        """Do what a message asks for."""
+        if self._is_experimenter:
+            self._pages.experimenter_says(client, cast(ExperimenterMessage, message))
+        else:
+            self._pages.participant_says(client, cast(ParticipantMessage, message))
 
-def _end_with(writer: asyncio.Task[None], client: Client) -> None:
-    """Drop a client after its writer has ended."""
-    if not writer.cancelled() and writer.exception() is not None:
-        client.drop('cannot be sent to')
+    def tell(self, client: Client, error: InputError) -> None:
+        """Write into the log why a message cannot be read."""
+        _log.info('%s: %s', client.id, error)
 
 
 # JavaScript modules import each other by their path among the pages.
@@ -148,6 +107,8 @@ PARTICIPANT = 'participant'
 MAX_PAGES = 12
 _STALL_CHECK_S = 0.5
 _ONLY_EXPERIMENTER = "This page is the experimenter's: its address stands on the terminal."
+_USED = ('This link is not good any more: it lets one browser in, once. '
+         'The program prints another one when it is started again.')
 _LOOPBACK = ('127.0.0.1', 'localhost')
 
 
@@ -234,7 +195,8 @@ def _add_pages(app: web.Application, desk: Desk, access: Access,
 
     async def experimenter(request: web.Request) -> web.Response:
         if 'token' in request.query:
-            return _exchange(request, access, experimenters)
+            return enter(request, experimenters.exchange, _cookie_name(request, access),
+                         '/experimenter', _USED)
         if not _is_experimenter(request, access, experimenters):
             return web.Response(status=403, text=f'{_ONLY_EXPERIMENTER}\n')
         return file_answer(request, table['/experimenter'])
@@ -287,20 +249,6 @@ def read_desk_files() -> Mapping[str, PageFile]:
                               'install crgame_ros again')
         table[path] = table[f'/static/{file}']
     return table
-
-
-def _exchange(request: web.Request, access: Access, experimenters: Invitations) -> web.Response:
-    name = _cookie_name(request, access)
-    try:
-        cookie = experimenters.exchange(request.query['token'], request.cookies.get(name))
-    except InputError:
-        return web.Response(status=403, text=(
-            'This link is not good any more: it lets one browser in, once. '
-            'The program prints another one when it is started again.\n'))
-    answer = web.Response(status=303, headers={'Location': '/experimenter'})
-    answer.set_cookie(name, cookie, httponly=True, samesite='Strict',
-                      secure=access.tls is not None, max_age=COOKIE_S)
-    return answer
 
 
 def _is_experimenter(request: web.Request, access: Access, experimenters: Invitations) -> bool:
