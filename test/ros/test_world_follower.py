@@ -58,7 +58,7 @@ class Stage:
         self._documents = {kind: endpoints.publisher(f'/scenario/{kind}') for kind in KINDS}
         self.steps: list[WorldStep] = []
         self.wait(lambda: all(item.get_subscription_count() == 1
-                               for item in (self._states, self._objects)))
+                              for item in (self._states, self._objects)))
 
     def wait(self, condition: Callable[[], bool]) -> None:
         until_s = time.monotonic() + PATIENCE_S

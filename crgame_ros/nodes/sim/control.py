@@ -119,8 +119,8 @@ class SimControl:
                        (MIN_REAL_TIME_FACTOR, MAX_REAL_TIME_FACTOR), read_only=False)
         # From the command line [s]; 0 if none.
         self.duration_s = declare_number(
-            self._node, 'duration', 0.0, "simulated seconds until the run ends; 0 takes the "
-            "game's", (0.0, 1e7))
+            self._node, 'duration', 0.0,
+            "simulated seconds until the run ends; 0 takes the game's", (0.0, 1e7))
         self.starts_paused = fixed(self._node, 'start_paused', False,
                                    'wait for /sim/start, with each game anew')
         self.countdown_from_s = declare_number(
