@@ -71,7 +71,6 @@ class TorqueLimiter:
 
 
 REMEDY = 'see docs/driving.md, section "Add a device"'
-_FORM = Form(REMEDY)
 Index = Annotated[int, Within(0, 999)]
 Finite = Annotated[float, Within()]
 Way = Literal['evdev', 'joy']
@@ -112,8 +111,6 @@ Keys = Annotated[tuple[Annotated[int, Code('KEY_')], ...], Listed(1)]
 @dataclass(frozen=True, kw_only=True)
 class AxisEntry:
     """An axis in one way of reading the device; see `EvdevAxis` and `JoyAxis`."""
-
-    FORM: ClassVar[Form] = _FORM
 
     axis: int
     min: Finite | None = None  # noqa: A003
@@ -208,8 +205,6 @@ class AxisPair:
     :param deadzone: share of the travel around the rest that counts as rest [-]
     """
 
-    FORM: ClassVar[Form] = _FORM
-
     evdev: EvdevAxis
     joy: JoyAxis
     deadzone: Annotated[float, Within(0.0, 0.5)] = 0.0
@@ -230,8 +225,6 @@ class ButtonPair:
     :param joy: its index.
     """
 
-    FORM: ClassVar[Form] = _FORM
-
     evdev: Annotated[int, Code('BTN_')]
     joy: Index
 
@@ -251,8 +244,6 @@ class ButtonEntry:
     :param horn: it sounds while held.
     :param put_back: after a contact the vehicle is put back on its lane.
     """
-
-    FORM: ClassVar[Form] = _FORM
 
     reverse_on: tuple[ButtonPair, ...] = ()
     reverse_off: tuple[ButtonPair, ...] = ()
@@ -295,8 +286,6 @@ class KeyEntry:
     :param horn: it sounds while held.
     :param put_back: after a contact the vehicle is put back on its lane.
     """
-
-    FORM: ClassVar[Form] = _FORM
 
     throttle: Keys
     brake: Keys
