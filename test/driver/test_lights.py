@@ -128,6 +128,7 @@ def test_every_shipped_map_has_indicators_and_horn() -> None:
             if gear_buttons is not None:
                 gear = vars(gear_buttons).values()
                 assert len(frozenset().union(*groups, *gear)) == sum(map(len, [*groups, *gear]))
+        assert keys is None or not frozenset().union(*vars(keys.lights).values()) & keys.codes
 
 
 def test_a_joy_node_works_the_lever() -> None:
