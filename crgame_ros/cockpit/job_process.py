@@ -153,15 +153,18 @@ class JobProcess:
 
     async def close(self) -> None:
         """End the process."""
-        process, self._process = self._process, None
+        process = self._process
         if process is None:
             return
         if process.returncode is None:
             process.kill()
+        # Kept until then: whoever ends the server waits for it too if this job is cancelled.
         await process.wait()
         # Else its pipes would be closed after the event loop.
         if process.stdin is not None:
             process.stdin.close()
+        if self._process is process:
+            self._process = None
 
     async def _run(self, job: dict[str, object], unwanted: Callable[[], bool]) -> bytes:
         done = False

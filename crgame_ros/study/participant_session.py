@@ -30,7 +30,9 @@ from crgame_ros.study.groups import (
 from crgame_ros.study.question import Answer, asked_of, check_answers, Question
 from crgame_ros.study.questionnaire import questionnaire_of, questions_of
 from crgame_ros.study.session_journal import (
+    chosen_language,
     done_items,
+    first_of,
     how_ended,
     JournalEntry,
     SessionEvent,
@@ -92,9 +94,8 @@ class ParticipantSession:
 
     def _begin(self, place: int | None, group: str | None) -> None:
         """Note the beginning, or take up what the journal has."""
-        begun, allocated = (next((entry for entry in self.journal.entries
-                                  if entry['entry'] == kind), None)
-                            for kind in (SessionEvent.BEGUN, SessionEvent.ALLOCATED))
+        begun = first_of(self.journal.entries, SessionEvent.BEGUN)
+        allocated = first_of(self.journal.entries, SessionEvent.ALLOCATED)
         self._check_given(group, begun)
         with enrolling(self._folder.parent):
             if place is None:
@@ -280,8 +281,7 @@ class ParticipantSession:
     @property
     def language(self) -> str | None:
         """Return the language that the participant chose last; None before a choice."""
-        return next((entry['language'] for entry in reversed(self.journal.entries)
-                     if entry['entry'] == SessionEvent.LANGUAGE), None)
+        return chosen_language(self.journal.entries)
 
     @property
     def page_language(self) -> str:
@@ -302,8 +302,7 @@ class ParticipantSession:
     @property
     def held_at(self) -> str | None:
         """Return the item after which the experimenter holds the session; None if not held."""
-        last = next((entry for entry in reversed(self.journal.entries)
-                     if entry['entry'] == SessionEvent.HELD), None)
+        last = first_of(reversed(self.journal.entries), SessionEvent.HELD)
         return None if last is None or not last['held'] else last['item']
 
     def hold(self, held: bool) -> None:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The journal of a participant's session, line by line, safe against crashes."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from enum import StrEnum
 import fcntl
@@ -204,10 +204,26 @@ def done_items(entries: Iterable[JournalEntry]) -> dict[str, JournalEntry]:
     return found
 
 
+def first_of(entries: Iterable[JournalEntry], *kinds: SessionEvent,
+             item: str | None = None) -> JournalEntry | None:
+    """
+    Return the first entry of some kinds; None without one. Of reversed entries it is the last.
+
+    :param item: that it is about; None for any.
+    """
+    return next((entry for entry in entries if entry['entry'] in kinds
+                 and item in (None, entry.get('item'))), None)
+
+
 def how_ended(entries: Iterable[JournalEntry]) -> JournalEntry | None:
     """Return the entry by which a session ended before its last item; None without one."""
-    return next((entry for entry in entries
-                 if entry['entry'] in (SessionEvent.ENDED, SessionEvent.EXCLUDED)), None)
+    return first_of(entries, SessionEvent.ENDED, SessionEvent.EXCLUDED)
+
+
+def chosen_language(entries: Sequence[JournalEntry]) -> str | None:
+    """Return the language that a participant chose last; None before a choice."""
+    chosen = first_of(reversed(entries), SessionEvent.LANGUAGE)
+    return None if chosen is None else chosen['language']
 
 
 def _refusal(path: Path, error: OSError) -> InputError:

@@ -458,3 +458,26 @@ async def test_a_scenario_that_takes_much_of_the_processor_is_given_up(tmp_path:
         assert given_up is not None and given_up.returncode is not None
         assert await reader.run('name', path='/a/b.xml') == b'{"name":"b.xml"}'
         await reader.close()
+
+
+@in_loop
+async def test_who_ends_a_server_waits_for_the_process_of_a_cancelled_job(tmp_path: Path) -> None:
+    """The loop is closed afterwards, when nobody could take note of the process's end."""
+    (tmp_path / 'endless.py').write_text(
+        'import time\n'
+        'from crgame_ros.cockpit.job_process import serve_jobs\n'
+        "serve_jobs({'wait': lambda path: time.sleep(1e3)}, 'scenario')\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv('PYTHONPATH', str(tmp_path))
+        reader = JobProcess('endless', 'scenario')
+        await reader.start()
+        process = reader._process
+        job = asyncio.create_task(reader.run('wait', path='/x'))
+        await asyncio.sleep(0.1)
+        job.cancel()
+        # It begins to end the process here.
+        await asyncio.sleep(0)
+        await reader.close()
+        assert process is not None and process.returncode is not None
+        with pytest.raises(asyncio.CancelledError):
+            await job

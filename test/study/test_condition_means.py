@@ -5,12 +5,8 @@
 import math
 import re
 
-from crgame_ros.study.data.condition_section import (
-    condition_means,
-    condition_svg,
-    participant_means,
-    within_halves,
-)
+from crgame_ros.study.analysis.planned_tests import participant_means
+from crgame_ros.study.data.condition_section import condition_means, condition_svg, within_halves
 import numpy as np
 import pytest
 from scipy import stats

@@ -75,9 +75,12 @@ class RunReplays:
 
     async def end(self, key: str) -> None:
         """End the replay of a run, if there is one."""
-        replay = self._replays.pop(key, None)
+        replay = self._replays.get(key)
         if replay is not None:
             await _end(replay.process)
+            # Kept until then: whoever ends the server waits for it, too.
+            if self._replays.get(key) is replay:
+                del self._replays[key]
 
     async def forward(self, run: PastRun, rest: str, request: web.Request) -> web.StreamResponse:
         """

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs a study's planned comparisons: tests and effect sizes, within or between people."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import math
+from operator import itemgetter
 
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.planned_analysis import Alternative, Comparison
@@ -216,6 +217,23 @@ def used_rows(study: StudyFile,
             and not any(row.get(flag) for flag in flags)]
 
 
+def participant_means(rows: Iterable[Mapping[str, object]], column: str,
+                      name_of: Callable[[Mapping[str, object]], str] = itemgetter('condition')
+                      ) -> dict[tuple[str, str], float]:
+    """
+    Compute the mean of a column for each participant in each condition, over repetitions.
+
+    :param rows: of the table of trials; missing and infinite values are left out.
+    :param name_of: returns what a trial is counted to, by default its condition.
+    """
+    found: dict[tuple[str, str], list[float]] = {}
+    for row in rows:
+        value = row.get(column)
+        if isinstance(value, int | float) and math.isfinite(value):
+            found.setdefault((str(row['participant']), name_of(row)), []).append(value)
+    return {key: sum(values) / len(values) for key, values in found.items()}
+
+
 def level_means(rows: Iterable[Mapping[str, object]], column: str,
                 measure: str) -> dict[str, dict[str, float]]:
     """
@@ -224,14 +242,12 @@ def level_means(rows: Iterable[Mapping[str, object]], column: str,
     :param column: of the factor.
     :return: by level and participant; missing and infinite values are left out.
     """
-    sums: dict[str, dict[str, list[float]]] = {}
-    for row in rows:
-        value, level = row.get(measure), row.get(column)
-        if level is None or not isinstance(value, int | float) or not math.isfinite(value):
-            continue
-        sums.setdefault(str(level), {}).setdefault(str(row['participant']), []).append(value)
-    return {level: {person: sum(values) / len(values) for person, values in people.items()}
-            for level, people in sums.items()}
+    found: dict[str, dict[str, float]] = {}
+    known = (row for row in rows if row.get(column) is not None)
+    for (person, level), mean in participant_means(
+            known, measure, lambda row: str(row[column])).items():
+        found.setdefault(level, {})[person] = mean
+    return found
 
 
 def planned_tests(study: StudyFile, rows: Sequence[Mapping[str, object]],

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report section on conditions: means with intervals, and a plot of each measure."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from operator import itemgetter
@@ -18,6 +18,7 @@ from crgame_ros.analysis.report.section import (
     tick_text,
 )
 from crgame_ros.analysis.tables.column import Column, NUMBER
+from crgame_ros.study.analysis.planned_tests import participant_means
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.trials_table import measure_columns, TASK_COLUMNS
 from crgame_ros.study.trial_plan import conditions_of
@@ -120,23 +121,6 @@ def within_halves(table: NDArray[np.float64]) -> NDArray[np.float64]:
     normed = table - table.mean(axis=1, keepdims=True) + table.mean()
     variances = normed.var(axis=0, ddof=1) * conditions / (conditions - 1)
     return np.asarray(_t(people - 1) * np.sqrt(variances / people))
-
-
-def participant_means(rows: Iterable[Mapping[str, object]], column: str,
-                      name_of: Callable[[Mapping[str, object]], str] = itemgetter('condition')
-                      ) -> dict[tuple[str, str], float]:
-    """
-    Compute the mean of a column for each participant in each condition, over repetitions.
-
-    :param rows: of the table of trials; missing and infinite values are left out.
-    :param name_of: returns what a trial is counted to, by default its condition.
-    """
-    found: dict[tuple[str, str], list[float]] = {}
-    for row in rows:
-        value = row.get(column)
-        if isinstance(value, int | float) and math.isfinite(value):
-            found.setdefault((str(row['participant']), name_of(row)), []).append(value)
-    return {key: sum(values) / len(values) for key, values in found.items()}
 
 
 def _half(values: NDArray[np.float64]) -> float:

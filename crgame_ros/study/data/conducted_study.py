@@ -18,8 +18,10 @@ from crgame_ros.study.groups import Allocation, allocation_of
 from crgame_ros.study.question import Answer
 from crgame_ros.study.questionnaire import questions_of
 from crgame_ros.study.session_journal import (
+    chosen_language,
     DECLINED,
     done_items,
+    first_of,
     how_ended,
     JournalEntry,
     read_journal,
@@ -248,8 +250,7 @@ class ParticipantRecord:
     @property
     def language(self) -> str | None:
         """Return the language that the participant chose last; None without a choice."""
-        return next((entry['language'] for entry in reversed(self.entries)
-                     if entry.get('language')), None)
+        return chosen_language(self.entries)
 
     def _attempt_of(self, entry: JournalEntry, item: str) -> int:
         told = entry.get('attempt')
@@ -301,11 +302,10 @@ def read_participant(study: StudyFile, folder: Path) -> ParticipantRecord | None
     :raises InputError: if it is of another study.
     """
     entries = tuple(read_journal(folder))
-    begun = next((entry for entry in entries if entry['entry'] == SessionEvent.BEGUN), None)
+    begun = first_of(entries, SessionEvent.BEGUN)
     if begun is None:
         return None
-    allocated = next((entry for entry in entries
-                      if entry['entry'] == SessionEvent.ALLOCATED), None)
+    allocated = first_of(entries, SessionEvent.ALLOCATED)
     allocation = None if allocated is None else allocation_of(allocated)
     if allocation is not None and allocated is not None:
         fits = allocation.group in study.group_names

@@ -39,7 +39,7 @@ from crgame_ros.study.data.study_row_table import (
 )
 from crgame_ros.study.data.trials_table import PARTICIPANT, PLACE_IN_GROUP, TrialsTable, utc, WALL
 from crgame_ros.study.file import StudyFile
-from crgame_ros.study.session_journal import JOURNAL, SessionEvent
+from crgame_ros.study.session_journal import first_of, JOURNAL, SessionEvent
 from crgame_ros.study.session_script import Fields
 import pyarrow as pa
 
@@ -112,6 +112,7 @@ class ParticipantsTable:
 
     def row(self, record: ParticipantRecord) -> dict[str, object]:
         """Return a participant's row."""
+        ended = first_of(record.entries, SessionEvent.ENDED)
         runs = {Path(entry['run']).parts[:2] for entry in record.entries
                 if entry.get('run')}
         row = {'participant': record.id, 'place': record.place + 1, 'language': record.language,
@@ -122,8 +123,7 @@ class ParticipantsTable:
                'trials': len(record.counted), 'trials_planned': record.trials_planned,
                'complete': record.complete, **_consent(record),
                **_excluded(record), **self._stepped.values(record),
-               'end_reason': next((entry.get('reason') for entry in record.entries
-                                   if entry['entry'] == SessionEvent.ENDED), None)}
+               'end_reason': None if ended is None else ended.get('reason')}
         if self.group is not None and record.allocation is not None:
             row |= {self.group.name: record.group,
                     PLACE_IN_GROUP.name: record.allocation.place + 1}

@@ -57,14 +57,14 @@ def data_command(values: argparse.Namespace) -> int:
     :raises InputError: if the folder holds no study, or cannot be written.
     """
     from crgame_ros.study.data.conducted_study import ConductedStudy
-    from crgame_ros.study.data.study_data_folder import only_writer, write_study_data
+    from crgame_ros.study.data.study_data_folder import BIDS, only_writer, write_study_data
     folder = ConductedStudy(values.folder)
     with only_writer(folder.data):
         data = _read(folder, reports=not values.no_reports)
         rows = write_study_data(data)
         if values.bids:
             from crgame_ros.study.data.bids_folder import write_bids
-            write_bids(data, folder.data / 'bids')
+            write_bids(data, folder.data / BIDS)
     width = max(map(len, rows))
     for name, count in rows.items():
         print(f'{name:<{width}} {count:>9} rows')
@@ -78,13 +78,14 @@ def report_command(values: argparse.Namespace) -> int:
 
     :raises InputError: if the folder holds no study, or the file cannot be written.
     """
+    from crgame_ros.analysis.report.command import REPORT_FILE
     from crgame_ros.analysis.report.file import check_report_path
     from crgame_ros.study.data.conducted_study import ConductedStudy
     from crgame_ros.study.data.study_data_folder import only_writer
     from crgame_ros.study.data.study_report import write_study_report
     folder = ConductedStudy(values.folder)
     with only_writer(folder.data):
-        out = values.out or folder.data / 'report.html'
+        out = values.out or folder.data / REPORT_FILE
         check_report_path(out)
         write_study_report(_read(folder), out)
     print(out)
@@ -99,11 +100,11 @@ def rerun_command(values: argparse.Namespace) -> int:
     """
     from crgame_ros.study.data.conducted_study import ConductedStudy
     from crgame_ros.study.data.study_data_folder import only_writer
-    from crgame_ros.study.data.study_rerun import rerun_study
+    from crgame_ros.study.data.study_rerun import RERUN, rerun_study
     folder = ConductedStudy(values.folder)
     with only_writer(folder.data):
         data = _read(folder)
-        out = values.out or folder.data / 'rerun'
+        out = values.out or folder.data / RERUN
         told = rerun_study(data, values.planner, out, values.workers, _print)
     print('\n'.join(told))
     print(out)

@@ -98,6 +98,7 @@ def _earlier(out: Path, made_of: list[list[object]]) -> dict[str, int] | None:
 
 
 RUNS, PROVENANCE, LOCK, R_SCRIPT = 'runs', 'provenance.json', '.lock', 'analysis.R'
+BIDS = 'bids'
 DESCRIPTION = (
     'What a study of crgame_ros has found. SI units and radians. A value that is missing is null '
     f'in Parquet; in CSV a missing number is {NOT_A_NUMBER}, any other missing value an empty '

@@ -21,6 +21,8 @@ from crgame_ros.study.data.conducted_study import ConductedStudy, DATA
 from crgame_ros.study.data.preregistration import PREREGISTRATION
 from crgame_ros.study.data.study_data import KEPT, read_study_data, TABLE_NAMES
 from crgame_ros.study.data.study_data_folder import (
+    BIDS,
+    LOCK,
     only_writer,
     PROVENANCE,
     R_SCRIPT,
@@ -37,7 +39,9 @@ from crgame_ros.whole_file import sync_folder, write_text
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-BIDS = 'bids'
+# What is made of the data of several participants, in the folder of data.
+_MADE_OF_PEOPLE = (*(f'{table}.{kind}' for table in TABLE_NAMES for kind in ('csv', 'parquet')),
+                   PACKAGE_FILE, PROVENANCE, REPORT_FILE, R_SCRIPT, RUNS, BIDS)
 # In the folder of a withdrawal that is under way: its state, and what was the participant's.
 _STATE, _MOVED = 'withdrawal.json', 'participant'
 _TOLD = 'the data of a participant were deleted'
@@ -207,10 +211,7 @@ class Withdrawal:
     def _derived(self) -> Iterator[Path]:
         """Yield what was made of the data of several participants, this one among them."""
         data = self.root / DATA
-        names = [f'{table}.{kind}' for table in TABLE_NAMES for kind in ('csv', 'parquet')]
-        for name in (*names, PACKAGE_FILE, PROVENANCE, REPORT_FILE, R_SCRIPT, RUNS, BIDS):
-            if (data / name).exists():
-                yield data / name
+        yield from (data / name for name in _MADE_OF_PEOPLE if (data / name).exists())
         for entry in sorted((data / KEPT).iterdir()) if (data / KEPT).is_dir() else ():
             if not _is_of_others(entry, self._together):
                 yield entry
@@ -254,9 +255,7 @@ class Withdrawal:
         data = self.root / DATA
         known = {STUDY_FILE.parts[0], PARTICIPANTS, DATA, WITHDRAWALS, WITHDRAWING, MADE,
                  PREREGISTRATION, PRIVATE}
-        names = {f'{table}.{kind}' for table in TABLE_NAMES for kind in ('csv', 'parquet')}
-        names |= {PACKAGE_FILE, PROVENANCE, REPORT_FILE, R_SCRIPT, RUNS, BIDS, RERUN, KEPT,
-                  '.lock'}
+        names = {*_MADE_OF_PEOPLE, RERUN, KEPT, LOCK}
         return [*(path for path in sorted(self.root.iterdir()) if path.name not in known),
                 *(path for path in sorted(data.iterdir()) if path.name not in names)]
 

@@ -15,7 +15,7 @@ from crgame_ros.study.drive_watch import DrivePhase, DriveState
 from crgame_ros.study.file import Break, Page
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.questionnaire import consent_of
-from crgame_ros.study.session_journal import DECLINED, SessionEvent
+from crgame_ros.study.session_journal import DECLINED, first_of, SessionEvent
 from crgame_ros.study.session_script import is_driven
 
 
@@ -130,9 +130,8 @@ class Desk:
         item = self.session.next_item
         if item is None or not isinstance(item.what, Break):
             return 0.0
-        began = next((entry for entry in reversed(self.session.journal.entries)
-                      if entry['entry'] == SessionEvent.STARTED and entry['item'] == item.id),
-                     None)
+        began = first_of(reversed(self.session.journal.entries), SessionEvent.STARTED,
+                         item=item.id)
         at = self.clock_s() if began is None else began['at']
         return max(0.0, at + 60.0 * item.what.minutes - self.clock_s())
 
@@ -259,10 +258,10 @@ class Desk:
     def moment(self) -> dict[str, object]:
         """Return the run and its clock [s]; None between drives."""
         state = self.drives.state
-        run = next((entry.get('run', '') for entry in reversed(self.session.journal.entries)
-                    if entry['entry'] == SessionEvent.STARTED and entry['item'] == state.item),
-                   '') if state.time_s is not None else ''
-        return {'run': run, 'time_s': state.time_s}
+        started = None if state.time_s is None else first_of(
+            reversed(self.session.journal.entries), SessionEvent.STARTED, item=state.item)
+        return {'run': '' if started is None else started.get('run', ''),
+                'time_s': state.time_s}
 
     def _refuse_while_driving(self) -> None:
         if self.is_driving:
