@@ -3,6 +3,7 @@
 """Runs read back from recordings: every storage, several runs, gaps, cuts, and exact replay."""
 
 from collections.abc import Callable
+import os
 from pathlib import Path
 from typing import Any
 
@@ -174,7 +175,7 @@ def test_recording_that_was_cut_off(tmp_path: Path, recorder: Any, drive: Drive)
     folder = recorder.ours(tmp_path / 'bag', recorder.messages(result))
     (folder / 'metadata.yaml').unlink()
     file = folder / 'bag_0.mcap'
-    file.write_bytes(file.read_bytes()[:-20_000])
+    os.truncate(file, file.stat().st_size * 13 // 20)
     log = read_trajectories(folder)
     whole = trajectories_of(result)
     assert 2 < len(log.ks) < 11
