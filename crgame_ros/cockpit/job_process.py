@@ -154,17 +154,11 @@ class JobProcess:
     async def close(self) -> None:
         """End the process."""
         process = self._process
-        if process is None:
-            return
-        if process.returncode is None:
-            process.kill()
-        # Kept until then: whoever ends the server waits for it too if this job is cancelled.
-        await process.wait()
-        # Else its pipes would be closed after the event loop.
-        if process.stdin is not None:
-            process.stdin.close()
-        if self._process is process:
-            self._process = None
+        if process is not None:
+            await end_module(process)
+            # Kept until then: whoever ends the server waits for it too if this job is cancelled.
+            if self._process is process:
+                self._process = None
 
     async def _run(self, job: dict[str, object], unwanted: Callable[[], bool]) -> bytes:
         done = False
@@ -227,3 +221,13 @@ async def start_module(module: str, *arguments: str,
         sys.executable, '-P', '-m', module, *arguments, stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE, env={**os.environ, 'PYTHONPATH': os.pathsep.join(paths)},
         start_new_session=own_session)
+
+
+async def end_module(process: asyncio.subprocess.Process) -> None:
+    """End a process that `start_module` has started, if it has not ended yet."""
+    if process.returncode is None:
+        process.kill()
+    await process.wait()
+    # Else its pipes would be closed after the event loop.
+    if process.stdin is not None:
+        process.stdin.close()

@@ -93,17 +93,6 @@ def seat_orders(reader: BagReader, run: Epoch) -> tuple[SeatOrder, ...]:
     return tuple(found)
 
 
-def read_seat_orders(path: Path, epoch: int | None = None) -> tuple[SeatOrder, ...]:
-    """
-    Read the orders of a run from its recording, as `seat_orders` does.
-
-    :param epoch: which run, where a recording holds several; None for the last.
-    :raises InputError: if there is no such run in it.
-    """
-    with BagReader(path, parts=True) as reader:
-        return seat_orders(reader, read_epoch(reader, epoch))
-
-
 class RecordedDriver(NamedTuple):
     """
     One stretch of a run with one driver.
@@ -149,17 +138,6 @@ def drivers_of(reader: BagReader, run: Epoch) -> tuple[RecordedDriver, ...]:
     return tuple(RecordedDriver(item, *(_median(delays_ms.get(
         (item.seat, '' if item.person is None else item.person.id, name)))
         for name in _DELAYS)) for item in spells)
-
-
-def read_drivers(path: Path, epoch: int | None = None) -> tuple[RecordedDriver, ...]:
-    """
-    Read the drivers of a run from its recording, as `drivers_of` does.
-
-    :param epoch: which run, where a recording holds several; None for the last.
-    :raises InputError: if there is no such run in it.
-    """
-    with BagReader(path, parts=True) as reader:
-        return drivers_of(reader, read_epoch(reader, epoch))
 
 
 def _median(values: list[float] | None) -> float | None:

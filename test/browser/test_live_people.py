@@ -275,12 +275,12 @@ def get(address: str) -> tuple[int, str]:
 
 def check_recording(graph: Graph) -> None:
     """End all processes, and read the drivers from the bag."""
-    from crgame_ros.recording.run_record import read_drivers
+    from crgame_ros.recording.run_record import read_run_record
     launcher = graph.launcher
     launcher.signal(signal.SIGINT)
     wait_until(lambda: not any(is_node(pid) for _, pid in launcher.started), 'the end',
                PATIENCE_S)
-    drivers = [item for item in read_drivers(launcher.out / 'bag')
+    drivers = [item for item in read_run_record(launcher.out / 'bag').drivers
                if item.spell.person is not None]
     assert [(item.spell.seat, item.spell.person.name, item.spell.person.role)
             for item in drivers if item.spell.until_n is None] == [

@@ -11,7 +11,7 @@ from crgame_ros.launcher.run_plan import effective_setup, RunRequest
 from crgame_ros.recording.recorded_game import read_run_events, recorded_inputs
 from crgame_ros.recording.run_folder import run_folders
 from crgame_ros.recording.run_points import recorded_states
-from crgame_ros.recording.run_record import read_drivers
+from crgame_ros.recording.run_record import read_run_record
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.verdict.validation import validate
 from live_browser_support import Graph, live_graph, LivePage, PATIENCE_S, SCENARIOS
@@ -219,7 +219,7 @@ def test_the_recording_repeats_the_jumps_to_the_last_bit(graph: Graph) -> None:
     assert [event.name for event in fired[:4]] == [
         'contact of hv0 with hv1', 'put back hv0'] * 2
     assert [event.vehicle for event in fired].count('hv0') == 2
-    device = [item for item in read_drivers(bag) if item.spell.seat == 'hv1']
+    device = [item for item in read_run_record(bag).drivers if item.spell.seat == 'hv1']
     assert device[0].input_delay_ms is not None and 0.0 < device[0].input_delay_ms < 1000.0
     setup = effective_setup(RunRequest(driver=f'replay:{bag}'))
     inputs = recorded_inputs(setup)

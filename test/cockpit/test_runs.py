@@ -214,7 +214,7 @@ async def test_a_replay_that_died_is_ended_before_it_begins_again(
         ended.append(process.run)
 
     monkeypatch.setattr(routes, '_start', start)
-    monkeypatch.setattr(routes, '_end', end)
+    monkeypatch.setattr(routes, 'end_module', end)
     replays = routes.RunReplays()
     runs = [PastRun(str(number), tmp_path, tmp_path) for number in range(routes.MOST_REPLAYS)]
     for run in runs:

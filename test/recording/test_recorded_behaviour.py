@@ -14,7 +14,6 @@ from crgame_ros.game.game import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.run_record import (
     read_run_record,
-    read_seat_orders,
     run_record_of,
     SeatOrder,
 )
@@ -61,11 +60,11 @@ def bag(taken_over: OfflineResult, recorder: Any, samples: Any,
 def test_orders_of_seats_are_read(bag: Path, recorder: Any, tmp_path: Path,
                                   taken_over: OfflineResult) -> None:
     """They are at the step of the newest state; invalid orders and runs without have none."""
-    assert read_seat_orders(bag) == (
+    assert read_run_record(bag).orders == (
         SeatOrder(180, 'av0', 'game'), SeatOrder(250, 'av0', 'cockpit'),
         SeatOrder(700, 'av0', 'game'))
     plain = recorder.ours(tmp_path / 'bag', recorder.messages(taken_over))
-    assert read_seat_orders(plain) == ()
+    assert read_run_record(plain).orders == ()
 
 
 def test_a_recording_says_the_same_as_the_run(bag: Path,

@@ -12,7 +12,7 @@ from crgame_ros.game.game import load_game
 from crgame_ros.game.seat_documents import DRIVERS, DrivingSpell, DrivingSpells
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_game import recorded_inputs
-from crgame_ros.recording.run_record import read_drivers, read_run_record, run_record_of
+from crgame_ros.recording.run_record import read_run_record, run_record_of
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np
@@ -77,5 +77,5 @@ def test_delays_of_drivers_are_their_runs(recorder: Any, samples: Any, tmp_path:
                           DrivingSpell('hv0', 'device', 'keyboard', None, 0),)))))]
     bag = recorder.ours(tmp_path / 'bag', messages)
     for epoch, median_ms in enumerate((45.0, 7.5)):
-        driver, = read_drivers(bag, epoch)
+        driver, = read_run_record(bag, epoch).drivers
         assert (driver.input_delay_ms, driver.round_trip_ms) == (median_ms, None)

@@ -14,7 +14,7 @@ import zipfile
 
 from aiohttp import ClientError, ClientSession, hdrs, web, WSMsgType
 from crgame_ros.cockpit.access import cookie_for, cookie_name, new_token
-from crgame_ros.cockpit.job_process import JobProcess, start_module
+from crgame_ros.cockpit.job_process import end_module, JobProcess, start_module
 from crgame_ros.cockpit.library_routes import (
     Answer,
     asked_id,
@@ -77,7 +77,7 @@ class RunReplays:
         """End the replay of a run, if there is one."""
         replay = self._replays.get(key)
         if replay is not None:
-            await _end(replay.process)
+            await end_module(replay.process)
             # Kept until then: whoever ends the server waits for it, too.
             if self._replays.get(key) is replay:
                 del self._replays[key]
@@ -124,20 +124,12 @@ async def _start(run: PastRun) -> _Replay:
         async with asyncio.timeout(BEGIN_S):
             told = json.loads(await process.stdout.readline() or b'{}')
     except (TimeoutError, ConnectionError, ValueError) as error:
-        await _end(process)
+        await end_module(process)
         raise InputError('cannot be shown', run.name, 'the log of the server says why') from error
     if 'port' not in told:
-        await _end(process)
+        await end_module(process)
         raise InputError(str(told.get('error', 'cannot be shown')), run.name)
     return _Replay(process, int(told['port']), token)
-
-
-async def _end(process: asyncio.subprocess.Process) -> None:
-    if process.returncode is None:
-        process.kill()
-    await process.wait()
-    if process.stdin is not None:
-        process.stdin.close()
 
 
 async def _forward_socket(http: ClientSession, replay: _Replay,
