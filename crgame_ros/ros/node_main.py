@@ -21,6 +21,8 @@ NICE_VARIABLE = 'CRGAME_NICE'
 TELL_WHERE = signal.SIGUSR1
 # A node that has lost its parent has this long to end in good order; period of that check [s].
 _GRACE_S, _LOOK_S = 40.0, 2.0
+# Longest time in which a node releases its endpoints [s].
+_RELEASE_S = 30.0
 
 
 class StopFlag:
@@ -130,6 +132,9 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
         print(f'error: {" ".join(str(error).split())}', file=sys.stderr, flush=True)
         code = 2
     finally:
+        # Fast DDS waits for itself for ever if it destroys an endpoint while the lease of another
+        # participant ends. It holds Python's lock then: only C code can end the process.
+        faulthandler.dump_traceback_later(_RELEASE_S, exit=True)
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
@@ -140,5 +145,6 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
         if node is not None:
             vars(node).clear()
         gc.collect()
+        faulthandler.cancel_dump_traceback_later()
     sys.stdout.flush()
     sys.exit(code)

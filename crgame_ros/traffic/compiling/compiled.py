@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compilation of the loops over agents with numba and a cache on disk."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, cast, TypeVar
 
 from crgame_ros.traffic.compiling.kernel_cache import cache_root, digest
 import numba
+from numba.core.types import Type, unliteral
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,7 +40,7 @@ def inlined(function: Function) -> Function:
 def compiled(function: Function) -> Function:
     """Compile a function of numbers and arrays; divisions by zero give inf and NaN, as numpy's."""
     _choose_cache(function)
-    return cast(Function, numba.njit(cache=True, error_model='numpy')(function))
+    return _once(numba.njit(cache=True, error_model='numpy')(function))
 
 
 def bare(function: Function) -> Function:
@@ -52,4 +53,19 @@ def bare(function: Function) -> Function:
     _choose_cache(function)
     # numba does not document `_nrt`.
     options: dict[str, Any] = {'cache': True, 'error_model': 'numpy', '_nrt': False}
-    return cast(Function, numba.njit(**options)(function))
+    return _once(numba.njit(**options)(function))
+
+
+def _once(dispatcher: Any) -> Any:
+    """
+    Compile a function that compiled code calls once for all values of a number.
+
+    numba does so once more for each literal that a caller has: for `0` and for `steps`.
+    """
+    template = dispatcher.get_call_template
+
+    def of_any_value(args: Iterable[Type], options: dict[str, Type]) -> object:
+        return template(tuple(unliteral(each) for each in args),
+                        {name: unliteral(each) for name, each in options.items()})
+    dispatcher.get_call_template = of_any_value
+    return dispatcher

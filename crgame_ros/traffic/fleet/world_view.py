@@ -135,10 +135,14 @@ def with_agents(others: Bodies, agents: AgentTable) -> Bodies:
     result = Bodies(np.empty((count, 3)), np.empty((count, 3)), np.empty(count), np.empty(count),
                     np.empty(count), np.empty(count, np.int64), np.empty(count),
                     np.empty(count, np.int64))
-    result.poses[:first], result.velocities[:first] = others.poses, others.velocities
-    result.acceleration[:first], result.length[:first] = others.acceleration, others.length
-    result.width[:first], result.owner[:first] = others.width, others.owner
-    result.time[:first], result.claim[:first] = others.time, others.claim
+    # One by one: numba takes seconds to compile the assignment of an array to a part of one.
+    for n in range(first):
+        for axis in range(3):
+            result.poses[n, axis] = others.poses[n, axis]
+            result.velocities[n, axis] = others.velocities[n, axis]
+        result.acceleration[n], result.owner[n] = others.acceleration[n], others.owner[n]
+        result.length[n], result.width[n] = others.length[n], others.width[n]
+        result.time[n], result.claim[n] = others.time[n], others.claim[n]
     write_centers(agents, slots, result.poses[first:], result.velocities[first:])
     for i, slot in enumerate(slots):
         n = first + i
