@@ -29,3 +29,12 @@ def test_help_loads_little(command: str) -> None:
     count, *names = done.stdout.split()
     assert int(count) <= MOST
     assert not {*LARGE} & {*names}
+
+
+def test_a_run_loads_no_library_that_it_does_not_use() -> None:
+    """Each of these would take a tenth to a third of a second of every start."""
+    done = subprocess.run([sys.executable, '-c', COUNT, 'offline', 'cut_in', '--duration', '0.2'],
+                          capture_output=True, text=True, check=True)
+    _, *names = done.stdout.split()
+    assert 'shapely' in names
+    assert not {'scipy', 'matplotlib', 'PIL', 'pandas', 'pyarrow', 'numba'} & {*names}

@@ -15,7 +15,6 @@ from crgame_ros.game.perception_spec import SensorSpec
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.reference_point import ahead, seen_from
 from crgame_ros.perception.sensors import create_sensor
-from crgame_ros.policy.bird_view import BirdView
 from crgame_ros.policy.observation_spec import (
     Numbers,
     OBJECT_COLUMNS,
@@ -56,6 +55,8 @@ class Observation:
             self._lidar = create_sensor(SensorSpec(
                 'lidar', field_of_view=2.0 * np.pi, horizon=spec.horizon, rays=spec.rays))
         if 'image' in spec.parts:
+            # Pillow is imported by those who draw alone, not at each start of a run.
+            from crgame_ros.policy.bird_view import BirdView
             self._bird = BirdView(spec.image_size, spec.pixel, scenario.lanelet_network)
 
     def observe(self, around: Sequence[Surrounded], places: Sequence[RoutePlace],

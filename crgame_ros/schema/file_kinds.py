@@ -206,13 +206,6 @@ class FileKind(NamedTuple):
         """Return its JSON Schema."""
         return json_schema(self.declared, self.title)
 
-    def keys(self) -> frozenset[str]:
-        """Return the top-level keys of such a file."""
-        describer = _Describer()
-        describer.describe(self.declared)
-        properties = describer.definitions[self.name].get('properties')
-        return frozenset(properties if isinstance(properties, dict) else ())
-
 
 FILE_KINDS = {
     'game': FileKind('crgame_ros.game.game', 'Game', 'Game file'),

@@ -29,6 +29,7 @@ from crgame_ros.recording.timing_report import REPORT_KEYS
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.export_network import schema_errors, solution_schema_errors
 from crgame_ros.scenario.loading import parse_scenario
+from crgame_ros.schema.declaration import known_keys
 from crgame_ros.schema.file_kinds import FILE_KINDS, FileKind
 from crgame_ros.schema.reading import faults_of
 from crgame_ros.schema.writing import write
@@ -252,7 +253,8 @@ def _yaml(path: Path, _progress: Progress | None) -> FileVerdict:
 
 def _yaml_kind(values: object, path: Path) -> tuple[FileKind, tuple[InputError, ...]]:
     """Choose the kind of file that declares most of the keys and has the fewest faults."""
-    shares = {name: len(kind.keys() & values.keys()) if isinstance(values, dict) else 0
+    given = values.keys() if isinstance(values, dict) else set()
+    shares = {name: len(given & set(known_keys(kind.declared)))
               for name, kind in FILE_KINDS.items()}
     most = max(shares.values())
     if not most:
