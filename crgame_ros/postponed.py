@@ -8,8 +8,9 @@ from importlib import import_module
 import sys
 from types import ModuleType
 
-# What CommonRoad's packages draw with.
-DRAWING = ('matplotlib.pyplot', 'commonroad.visualization.mp_renderer')
+# What CommonRoad's packages draw with; scipy imports all of numpy, also what compiles Fortran.
+UNUSED = ('matplotlib', 'matplotlib.colors', 'matplotlib.pyplot',
+          'commonroad.visualization.mp_renderer', 'numpy.f2py')
 
 
 class _Postponed(ModuleType):
@@ -35,9 +36,19 @@ def postponed(*names: str) -> Iterator[None]:
     :param names: full names of the others; those already loaded are taken as they are.
     """
     absent = [name for name in names if name not in sys.modules]
-    sys.modules.update({name: _Postponed(name) for name in absent})
+    # A package has its parts as attributes, too.
+    parts: list[tuple[ModuleType, str]] = []
+    for name in absent:
+        sys.modules[name] = _Postponed(name)
+        above, _, part = name.rpartition('.')
+        if above in sys.modules:
+            setattr(sys.modules[above], part, sys.modules[name])
+            parts.append((sys.modules[above], part))
     try:
         yield
     finally:
         for name in absent:
             del sys.modules[name]
+        for package, part in parts:
+            if not isinstance(package, _Postponed):
+                delattr(package, part)

@@ -5,6 +5,7 @@
 from pathlib import Path
 import subprocess
 import sys
+import xml
 
 from crgame_ros.postponed import postponed
 import pytest
@@ -38,4 +39,17 @@ def test_nothing_is_loaded_that_only_draws() -> None:
     code = 'import sys, crgame_ros.analysis.scores.checker, crgame_ros.planner.idm_package, ' \
         'crgame_ros.planner.reactive; print(*sys.modules)'
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
-    assert not {'matplotlib.pyplot', 'matplotlib.axes'} & {*done.stdout.split()}
+    assert not {'matplotlib', 'numpy.f2py'} & {*done.stdout.split()}
+
+
+def test_parts_of_packages_are_as_before_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ('curses', 'curses.ascii', 'xml.sax'):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.delattr(xml, 'sax', raising=False)
+    with postponed('curses', 'curses.ascii', 'xml.sax'):
+        from curses import ascii as letters
+        import curses.ascii as same
+        assert letters is same and 'sax' in vars(xml)
+    assert same.isdigit('7')
+    assert 'curses.ascii' in sys.modules and 'xml.sax' not in sys.modules
+    assert 'sax' not in vars(xml)

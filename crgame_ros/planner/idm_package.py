@@ -48,13 +48,13 @@ from crgame_ros.planner.reference_path import (
     desired_speeds,
     DrivingPath,
 )
-from crgame_ros.postponed import DRAWING, postponed
+from crgame_ros.postponed import postponed, UNUSED
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import STANDING
 import numpy as np
 from numpy.typing import NDArray
 
-with postponed(*DRAWING):
+with postponed(*UNUSED):
     from commonroad_idm_planner.configuration.planner_config import IDMConfig
     from commonroad_idm_planner.idm_path import IDMPathFactory
     from commonroad_idm_planner.idm_planner import IDMPlanner

@@ -18,13 +18,13 @@ from crgame_ros.planner.path_following import PathPosition
 from crgame_ros.planner.path_obstacles import Clearance
 from crgame_ros.planner.reference_path import DrivingPath
 from crgame_ros.planner.sample_kinematics import feasible, place
-from crgame_ros.postponed import DRAWING, postponed
+from crgame_ros.postponed import postponed, UNUSED
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import REST, STATE_WIDTH
 import numpy as np
 from numpy.typing import NDArray
 
-with postponed(*DRAWING):
+with postponed(*UNUSED):
     from commonroad_clcs.config import CLCSParams
     from commonroad_rp import reactive_planner as package
     from commonroad_rp.state import ReactivePlannerState

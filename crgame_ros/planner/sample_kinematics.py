@@ -13,11 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from crgame_ros.postponed import DRAWING, postponed
+from crgame_ros.postponed import postponed, UNUSED
 import numpy as np
 from numpy.typing import NDArray
 
-with postponed(*DRAWING):
+with postponed(*UNUSED):
     from commonroad_clcs.pycrccosy import (
         CurvilinearProjectionDomainLateralError,
         CurvilinearProjectionDomainLongitudinalError,

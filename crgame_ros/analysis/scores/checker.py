@@ -7,10 +7,19 @@ Importing them takes a second even without what they draw with, so users of this
 where they call it.
 """
 
-from crgame_ros.filters import smoothed
-from crgame_ros.postponed import DRAWING, postponed
+from functools import partial
+from importlib import import_module
 
-with postponed(*DRAWING, 'scipy.signal'):
+from commonroad.common.solution import vehicle_parameters, VehicleType
+from crgame_ros.filters import smoothed
+from crgame_ros.postponed import postponed, UNUSED
+
+# The files of the four vehicles are read once, by commonroad-io: again they take 0.2 s.
+for kind in VehicleType:
+    name = f'parameters_vehicle{kind.value}'
+    setattr(import_module(f'vehiclemodels.{name}'), name, partial(vehicle_parameters.get, kind))
+
+with postponed(*UNUSED, 'scipy.signal'):
     from commonroad_dc.costs import route_matcher
     from commonroad_dc.costs.evaluation import (
         CostFunctionEvaluator,
