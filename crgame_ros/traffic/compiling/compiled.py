@@ -7,7 +7,6 @@ from typing import Any, cast, TypeVar
 
 from crgame_ros.traffic.compiling.kernel_cache import cache_root, digest
 import numba
-from numba.core.types import Type, unliteral
 import numpy as np
 from numpy.typing import NDArray
 
@@ -62,10 +61,10 @@ def _once(dispatcher: Any) -> Any:
 
     numba does so once more for each literal that a caller has: for `0` and for `steps`.
     """
-    template = dispatcher.get_call_template
+    template, plain = dispatcher.get_call_template, numba.types.unliteral
 
-    def of_any_value(args: Iterable[Type], options: dict[str, Type]) -> object:
-        return template(tuple(unliteral(each) for each in args),
-                        {name: unliteral(each) for name, each in options.items()})
+    def of_any_value(args: Iterable[object], options: dict[str, object]) -> object:
+        return template(tuple(plain(each) for each in args),
+                        {name: plain(each) for name, each in options.items()})
     dispatcher.get_call_template = of_any_value
     return dispatcher
