@@ -20,24 +20,12 @@ from crgame_ros.analysis.report.section import (
     table,
 )
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.analysis.scores.vehicle import SCORE_MEASURES, VehicleScores
+from crgame_ros.analysis.scores.commonroad_costs import COSTS
+from crgame_ros.analysis.scores.nuplan import WEIGHTS
+from crgame_ros.analysis.scores.vehicle import NUPLAN_PARTS, SCORE_MEASURES, VehicleScores
 from crgame_ros.recording.recorded_plans import PlanOutcome
 from crgame_ros.timing.late_step import CAUSE_WORDS
 
-# Label of a measure and number of digits; costs range from hundredths to millions.
-_NUPLAN = {
-    'nuplan_score': 'nuPlan score, of 1', 'no_collision_at_fault': '× no collision at fault',
-    'drivable_area': '× on the road', 'driving_direction': '× in the driving direction',
-    'making_progress': '× makes progress', 'progress': '+ progress, weight 5',
-    'time_to_collision': '+ time to collision kept, weight 5',
-    'speed_limit': '+ speed limit kept, weight 4', 'comfort': '+ comfort, weight 2'}
-_COSTS = ('JB1', 'SA1', 'WX1', 'SM1', 'SM2', 'SM3', 'MW1', 'TR1')
-_WORDS = {
-    **_NUPLAN, **{name: f'CommonRoad cost {name}' for name in _COSTS},
-    'valid': 'Valid solution', 'feasible': 'Feasible', 'reached_s': 'Goal reached after',
-    'last_distance_m': 'Distance to the goal at the end',
-    'accepted_share': 'Plans accepted that are no braking plans',
-    'latency_ms': 'Latency of plans, median', 'age_ms': 'Age of the plan in use, median'}
 _LEFT_OUT = (" CommonRoad's costs, checks and feasibility, and how near the goal was, are left "
              'out of the report at the end of a run: <code>crgame report</code> adds them.')
 # Rows of table I: key of `timing.json`, label, unit, factor, digits.
@@ -112,22 +100,29 @@ def _table(caption: str, drivers: Sequence[_Driver], kind: str = 'numbers') -> s
 
 def _rows(drivers: Sequence[_Driver]) -> Iterator[Sequence[str]]:
     values = [each.scores.values() for each in drivers]
-    for name, words in _WORDS.items():
+    for name, measure in SCORE_MEASURES.items():
         if all(each[name] is None for each in values):
             continue
-        measure = SCORE_MEASURES[name]
         title = plain(f'{measure.definition}; {measure.variant}')
         unit = '' if measure.unit == '1' else measure.unit
-        yield (f'<span title="{title}">{words}</span>', unit,
+        yield (f'<span title="{title}">{_label(name)}</span>', unit,
                *(_cell(name, each[name]) for each in values))
+
+
+def _label(name: str) -> str:
+    label = SCORE_MEASURES[name].label
+    if name in WEIGHTS:
+        return f'+ {label.lower()}, weight {WEIGHTS[name]:g}'
+    return f'× {label.lower()}' if name in NUPLAN_PARTS else label
 
 
 def _cell(name: str, value: float | None) -> str:
     if value is None or isinstance(value, bool):
         return NOTHING if value is None else 'yes' if value else 'no'
-    if name in _COSTS:
+    # Costs range from hundredths to millions.
+    if name in COSTS:
         return f'{value:.4g}'
-    return number(value, 3 if name in _NUPLAN or name == 'accepted_share' else 1)
+    return number(value, 3 if SCORE_MEASURES[name].unit == '1' else 1)
 
 
 def _remarks(run: Run, scores: VehicleScores) -> Iterator[str]:

@@ -24,12 +24,6 @@ import numpy as np
 MOST_CPU_S = 120.0
 # Size of a picture [px].
 _WIDTH = 420
-# The labels of the parts of a score.
-_WORDS = {
-    'no_collision_at_fault': 'No collision at fault', 'drivable_area': 'On the road',
-    'driving_direction': 'With the traffic', 'making_progress': 'Made headway',
-    'progress': 'Progress', 'time_to_collision': 'Kept its distance',
-    'speed_limit': 'Kept the speed limit', 'comfort': 'Comfort'}
 
 
 def score(path: Path) -> dict[str, object]:
@@ -89,7 +83,7 @@ def _score_values(found: NuplanScore | None) -> dict[str, object]:
     parts = [(name, value, 0.0) for name, value in found.multipliers.items()]
     parts += [(name, value, WEIGHTS[name]) for name, value in found.weighted.items()]
     return {'score': _number(found.score), 'parts': [
-        {'name': _WORDS[name], 'value': _number(value), 'weight': weight,
+        {'name': SCORE_MEASURES[name].label, 'value': _number(value), 'weight': weight,
          'definition': SCORE_MEASURES[name].definition} for name, value, weight in parts]}
 
 

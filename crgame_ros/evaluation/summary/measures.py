@@ -10,6 +10,7 @@ from crgame_ros.analysis.criticality.criticality import CHIEF, EXPOSURES
 from crgame_ros.analysis.criticality.criticality import MEASURES as CRITICALITY
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES as RULES
+from crgame_ros.analysis.scores.vehicle import NUPLAN_PARTS
 from crgame_ros.analysis.tables.column import FLAG, INTEGER, NUMBER
 from crgame_ros.analysis.tables.vehicles import VEHICLES
 from crgame_ros.errors import InputError, short
@@ -130,14 +131,9 @@ MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('valid', 'AVs with a valid solution', 'score_valid', 1, 'true'),
     SummaryMeasure('feasible', 'AVs with a feasible drive', 'score_feasible', 1, 'true'),
     SummaryMeasure('nuplan', 'nuPlan score', 'score_nuplan', 1),
-    SummaryMeasure('no_collision_at_fault', 'nuPlan: no collision at fault',
-                   'score_no_collision_at_fault', 1),
-    SummaryMeasure('drivable_area', 'nuPlan: drivable area', 'score_drivable_area', 1),
-    SummaryMeasure('driving_direction', 'nuPlan: driving direction', 'score_driving_direction', 1),
-    SummaryMeasure('progress', 'nuPlan: progress', 'score_progress', 1),
-    SummaryMeasure('time_to_collision', 'nuPlan: time to collision', 'score_time_to_collision', 1),
-    SummaryMeasure('speed_limit', 'nuPlan: speed limit', 'score_speed_limit', 1),
-    SummaryMeasure('comfort', 'nuPlan: comfort', 'score_comfort', 1),
+    # Whether it made headway is told by its progress.
+    *(SummaryMeasure(name, f'nuPlan: {part.label.lower()}', f'score_{name}', 1)
+      for name, part in NUPLAN_PARTS.items() if name != 'making_progress'),
     # All AVs count in its mean; in that of the least TTC only those that approached a leader.
     SummaryMeasure('inverse_ttc', 'greatest 1/TTC', 'max_inverse_ttc', -1, least=0.001),
     *(SummaryMeasure(f'worst_{name}', each.extreme, f'worst_{name}', -each.worst,
