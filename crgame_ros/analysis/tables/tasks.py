@@ -120,40 +120,26 @@ TASK_TABLES = DETECTION_RESPONSES, DETECTION_SCORES, TAKE_OVER_REQUESTS, TASK_SP
 def write_tasks(run: Run, writers: Mapping[str, TableRows]) -> None:
     """Add the rows of a run to the tables of tasks."""
     events = task_events(run.record)
-    for table, rows in (
-            (DETECTION_RESPONSES, _responses(events)),
-            (DETECTION_SCORES, ({**score.as_dict(), 'vehicle': score.seat}
-                                for score in detection_scores(events))),
-            (TAKE_OVER_REQUESTS, _requests(events)), (TASK_SPANS, _spans(events))):
-        writers[table.name].add_rows(
-            {name: value for name, value in {'run': run.id, **row}.items()
-             if name in table.schema.names} for row in rows)
+    for table, kinds in ((DETECTION_RESPONSES, ('stimulus', 'unrequested')),
+                         (TAKE_OVER_REQUESTS, ('request',)), (TASK_SPANS, ('span',))):
+        _add(run, writers[table.name], (_row(event) for event in events if event.what in kinds))
+    _add(run, writers[DETECTION_SCORES.name], (
+        {**score.as_dict(), 'vehicle': score.seat} for score in detection_scores(events)))
 
 
-def _common(event: TaskEvent) -> dict[str, object]:
-    return {'task': event.name, 'vehicle': event.seat, 'number': event.value,
-            'time_s': event.onset_s, 'shown_delay_ms': event.times.delay_ms,
-            'shown_time_s': event.shown_s, 'shown_error_ms': event.times.clock_error_ms,
-            'picture_ms': event.times.picture_ms, 'outcome': event.outcome}
+def _add(run: Run, writer: TableRows, rows: Iterable[Row]) -> None:
+    """Add the values of rows for which the table has a column."""
+    writer.add_rows({name: value for name, value in {'run': run.id, **row}.items()
+                     if name in writer.declaration.schema.names} for row in rows)
 
 
-def _responses(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:
-    for event in events:
-        if event.what in ('stimulus', 'unrequested'):
-            yield {**_common(event), 'response_time_ms': event.times.response_ms,
-                   'paused_ms': event.times.paused_ms}
-
-
-def _requests(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:
-    for event in events:
-        if event.what == 'request':
-            yield {**_common(event), 'duration_s': event.duration_s,
-                   'first_input_s': event.response_time_s,
-                   'answered_s': event.answered_s}
-
-
-def _spans(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:
-    for event in events:
-        if event.what == 'span':
-            yield {'task': event.name, 'vehicle': event.seat, 'kind': event.kind,
-                   'time_s': event.onset_s, 'duration_s': event.duration_s}
+def _row(event: TaskEvent) -> Row:
+    """Return the values of an event by the columns of all tables of tasks."""
+    times = event.times
+    return {'task': event.name, 'kind': event.kind, 'vehicle': event.seat, 'number': event.value,
+            'time_s': event.onset_s, 'duration_s': event.duration_s,
+            'shown_delay_ms': times.delay_ms, 'shown_time_s': event.shown_s,
+            'shown_error_ms': times.clock_error_ms, 'picture_ms': times.picture_ms,
+            'response_time_ms': times.response_ms, 'paused_ms': times.paused_ms,
+            'first_input_s': event.response_time_s, 'answered_s': event.answered_s,
+            'outcome': event.outcome}
