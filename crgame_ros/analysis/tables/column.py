@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from crgame_ros.analysis.runs.run import Run
 
 NUMBER, INTEGER, TEXT, FLAG = pa.float64(), pa.int64(), pa.string(), pa.bool_()
+# The types' names in Table Schemas.
+KINDS = {NUMBER: 'number', INTEGER: 'integer', TEXT: 'string', FLAG: 'boolean'}
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Column:
     @property
     def kind(self) -> str:
         """Return the name of its type in Table Schemas: number, integer, string or boolean."""
-        return {NUMBER: 'number', INTEGER: 'integer', TEXT: 'string', FLAG: 'boolean'}[self.type]
+        return KINDS[self.type]
 
     @property
     def notes(self) -> dict[str, str]:

@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from crgame_ros.analysis.tables.column import Column, FLAG, TableDeclaration
+from crgame_ros.analysis.tables.column import Column, FLAG, KINDS, TableDeclaration
 from crgame_ros.analysis.tables.writer import Format, FORMULA_GUARD, INFINITE, NOT_A_NUMBER
 from crgame_ros.errors import InputError
 from crgame_ros.recording.run_folder import PACKAGE_FILE
@@ -29,8 +29,7 @@ DESCRIPTION = (
     f'numbers are inf and -inf, in CSV {INFINITE} and -{INFINITE}. Texts have no control '
     'characters but tabs and ends of lines; in CSV those that a spreadsheet would take for a '
     f'formula (= + - @, tab, carriage return) begin with {FORMULA_GUARD}.')
-_TYPES = {'number': pa.float64(), 'integer': pa.int64(), 'string': pa.string(),
-          'boolean': pa.bool_()}
+_TYPES = {kind: of for of, kind in KINDS.items()}
 _NULLS = ['', NOT_A_NUMBER]
 _REMEDY = 'export the run again'
 
@@ -79,7 +78,7 @@ def table_schema(declaration: TableDeclaration,
         '$schema': PROFILE.format('tableschema'),
         'fields': [_field(column, column.name in declaration.key)
                    for column in declaration.columns],
-        'missingValues': ['', NOT_A_NUMBER], 'primaryKey': list(declaration.key)}
+        'missingValues': _NULLS, 'primaryKey': list(declaration.key)}
     if parent is not None and declaration.key != (parent.field,):
         schema['foreignKeys'] = [{'fields': [parent.field], 'reference': {
             'resource': parent.table, 'fields': [parent.field]}}]
@@ -88,14 +87,11 @@ def table_schema(declaration: TableDeclaration,
 
 def _resource(table: WrittenTable, file_format: Format,
               parent: Parent | None) -> dict[str, object]:
-    with table.path.open('rb') as stream:
-        digest = hashlib.file_digest(stream, 'sha256').hexdigest()
     resource: dict[str, object] = {
         'name': table.declaration.name, 'type': 'table', 'path': table.name,
         'format': file_format, 'mediatype': _MEDIA_TYPES[file_format],
         'description': f'One row is {table.declaration.row}.', 'rows': table.rows,
-        'hash': f'sha256:{digest}',
-        'schema': table_schema(table.declaration, parent)}
+        'hash': _digest(table.path), 'schema': table_schema(table.declaration, parent)}
     if file_format == 'csv':
         # Of Parquet, frictionless cannot count the bytes, and takes that for an error.
         resource['bytes'] = table.path.stat().st_size
@@ -103,6 +99,11 @@ def _resource(table: WrittenTable, file_format: Format,
         resource['dialect'] = {'delimiter': ',', 'lineTerminator': '\r\n', 'quoteChar': '"',
                                'doubleQuote': True, 'header': True}
     return resource
+
+
+def _digest(path: Path) -> str:
+    with path.open('rb') as stream:
+        return f'sha256:{hashlib.file_digest(stream, "sha256").hexdigest()}'
 
 
 def _field(column: Column, key: bool) -> dict[str, object]:
@@ -149,8 +150,7 @@ class _Resource:
     def faults(self) -> Iterator[str]:
         """Yield the faults."""
         try:
-            with self._path.open('rb') as stream:
-                digest = f'sha256:{hashlib.file_digest(stream, "sha256").hexdigest()}'
+            digest = _digest(self._path)
             yield from (f'{self._path}: {what}' for what in self._content())
         except OSError as error:
             yield f'{self._path}: cannot be read ({error.strerror})'
