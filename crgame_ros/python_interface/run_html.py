@@ -40,7 +40,8 @@ def _picture(run: Run) -> str:
 def _rows(run: Run) -> Iterator[Sequence[str]]:
     drivers = {item.id: item.driver for item in run.game.humans}
     drivers |= {item.id: item.planner for item in run.game.avs}
-    for place, (name, found) in enumerate(run.vehicle_criticality.items()):
+    for place, found in enumerate(run.usual_criticality.report()):
+        name = found.vehicle_id
         worst = [found.worst.get(key) for key in _SHOWN]
         touched = None if run.contacts is None else sum(
             name in (item['vehicle'], item['with']) for item in run.contacts)

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # They take a second to import, and only measures need them.
     from crgame_ros.analysis.behaviour.driver import DriverBehaviour
-    from crgame_ros.analysis.criticality.criticality import Criticality, VehicleCriticality
+    from crgame_ros.analysis.criticality.criticality import Criticality
     from crgame_ros.analysis.pictures.critical_moments import Moment, Touch
     from crgame_ros.analysis.pictures.scene_frame import FrameScene
     from crgame_ros.analysis.pictures.timing_figure import TimedRun
@@ -286,11 +286,6 @@ class Run:
     def usual_criticality(self) -> 'Criticality':
         """Return how critical it was by the usual thresholds."""
         return self._criticality or self.measure()
-
-    @cached_property
-    def vehicle_criticality(self) -> 'dict[str, VehicleCriticality]':
-        """Return how critical it was for each driven vehicle."""
-        return {each.vehicle_id: each for each in self.usual_criticality.report()}
 
     @cached_property
     def course(self) -> dict[str, FloatArray]:

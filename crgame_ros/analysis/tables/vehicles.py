@@ -5,7 +5,7 @@
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from crgame_ros.analysis.criticality.criticality import EXPOSURES, MEASURES, VehicleCriticality
+from crgame_ros.analysis.criticality.criticality import EXPOSURES, MEASURES
 from crgame_ros.analysis.criticality.headways import LEAST_SPEED, SHORT_S
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES
@@ -145,10 +145,7 @@ def _drive(run: Run) -> Iterator[Row]:
 
 
 def _criticality(run: Run) -> Iterator[Row]:
-    for each in _measured(run):
-        if each is None:
-            yield {}
-            continue
+    for each in run.usual_criticality.report():
         least = each.worst.get('ttc')
         yield {
             **{f'worst_{name}{end}': value for name, worst in each.worst.items()
@@ -161,24 +158,17 @@ def _criticality(run: Run) -> Iterator[Row]:
 
 
 def _following(run: Run) -> Iterator[Row]:
-    for each in _measured(run):
-        row: dict[str, float] = {}
-        if each is not None:
-            row['share_following'] = each.headways.share_following()
-            row['share_approaching'] = each.headways.share_approaching()
-            for name, values in each.headways.distances().items():
-                row[f'{name}_mean'], row[f'{name}_median'] = values.mean, values.median
-            for name, values in each.headways.times().items():
-                row[f'{name}_mean_s'], row[f'{name}_median_s'] = values.mean, values.median
-                for limit, share in zip(SHORT_S, values.below, strict=True):
-                    row[f'{name}_below_{limit}s'] = share
+    for each in run.usual_criticality.report():
+        headways = each.headways
+        row = {'share_following': headways.share_following(),
+               'share_approaching': headways.share_approaching()}
+        for name, values in headways.distances().items():
+            row |= {f'{name}_mean': values.mean, f'{name}_median': values.median}
+        for name, values in headways.times().items():
+            row |= {f'{name}_mean_s': values.mean, f'{name}_median_s': values.median}
+            row |= {f'{name}_below_{limit}s': share
+                    for limit, share in zip(SHORT_S, values.below, strict=True)}
         yield row
-
-
-def _measured(run: Run) -> Iterator[VehicleCriticality | None]:
-    """Yield the criticality of each vehicle; None of one without."""
-    for item in run.log.vehicles:
-        yield run.vehicle_criticality.get(item.id)
 
 
 def _following_columns() -> Iterator[Column]:
