@@ -3,14 +3,13 @@
 """The table of driven vehicles: driver, distance, scores, and worst moments."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 from crgame_ros.analysis.criticality.criticality import EXPOSURES, MEASURES
 from crgame_ros.analysis.criticality.headways import LEAST_SPEED, SHORT_S
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.analysis.scores.vehicle import SCORE_MEASURES, VehicleScores
+from crgame_ros.analysis.scores.vehicle import SCORE_MEASURES, ScoreMeasure
 from crgame_ros.analysis.tables.behaviour import VEHICLE_BEHAVIOUR
 from crgame_ros.analysis.tables.column import (
     Column,
@@ -58,36 +57,16 @@ VEHICLE_RULES = TablePart(tuple(
     for name, measure in RULE_MEASURES.items()), _rules)
 
 
-class _ScoreColumn(NamedTuple):
-    """
-    The column of a measure.
-
-    :param name: name of the column.
-    :param measure: name of the score.
-    :param factor: factor from the measure's unit to SI.
-    :param median: whether the measure is a spread, and the column has its median.
-    """
-
-    name: str
-    measure: str
-    factor: float = 1.0
-    median: bool = False
+# By column, the score; ages and latencies of plans are in columns of their own.
+_SCORES = {'score_nuplan': 'nuplan_score', **{
+    f'score_{name.removesuffix("_m").lower()}': name for name in SCORE_MEASURES
+    if name not in ('nuplan_score', 'latency_ms', 'age_ms')}}
+_AGE = SCORE_MEASURES['age_ms']
 
 
-# Latencies are in the plans' own columns.
-_COLUMNS = (
-    _ScoreColumn('score_nuplan', 'nuplan_score'),
-    *(_ScoreColumn(f'score_{name.removesuffix("_m").lower()}', name) for name in SCORE_MEASURES
-      if name not in ('nuplan_score', 'latency_ms', 'age_ms')),
-    _ScoreColumn('score_age_p50_s', 'age_ms', 1e-3, True))
-
-
-def _declared(column: _ScoreColumn) -> Column:
-    measure = SCORE_MEASURES[column.measure]
-    flag = not measure.unit
+def _score_column(name: str, measure: ScoreMeasure) -> Column:
     return Column(
-        column.name, FLAG if flag else NUMBER, 's' if column.median else measure.unit,
-        f'median {measure.definition}' if column.median else measure.definition,
+        name, NUMBER if measure.unit else FLAG, measure.unit, measure.definition,
         variant=measure.variant,
         empty=f'{measure.undefined}, or {NOT_SCORED}' if measure.undefined else NOT_SCORED)
 
@@ -97,23 +76,19 @@ def _scores(run: Run) -> Iterator[Row]:
     for name in run.vehicles:
         each = scores.get(name)
         values = {} if each is None else each.values()
-        yield {**{column.name: _value(values.get(column.measure), column) for column in _COLUMNS},
+        age_ms = values.get('age_ms')
+        yield {**{column: values.get(score) for column, score in _SCORES.items()},
+               'score_age_p50_s': None if age_ms is None else 1e-3 * age_ms,
                'score_expert': None if each is None or each.nuplan is None
-               else each.nuplan.expert, 'score_failed_checks': _failed(each)}
-
-
-def _value(value: float | None, column: _ScoreColumn) -> float | None:
-    return value if value is None or column.factor == 1.0 else column.factor * value
-
-
-def _failed(scores: VehicleScores | None) -> str | None:
-    if scores is None or scores.commonroad is None:
-        return None
-    return ', '.join(scores.commonroad.checks.failed)
+               else each.nuplan.expert,
+               'score_failed_checks': None if each is None or each.commonroad is None
+               else ', '.join(each.commonroad.checks.failed)}
 
 
 VEHICLE_SCORES = TablePart((
-    *map(_declared, _COLUMNS),
+    *(_score_column(name, SCORE_MEASURES[score]) for name, score in _SCORES.items()),
+    _score_column('score_age_p50_s', _AGE._replace(
+        unit='s', definition=f'median {_AGE.definition}')),
     Column('score_expert', TEXT, '', 'with whose progress it was compared: scores with different '
            'experts are not comparable', empty=f'{SCORE_MEASURES["progress"].undefined}, or '
            f'{NOT_SCORED}'),
