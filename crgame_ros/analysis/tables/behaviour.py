@@ -23,10 +23,10 @@ _REACTIONS = ('reaction_throttle', 'reaction_brake', 'reaction_steering')
 _SINCE_START = "since the run's start"
 
 
-def _column(name: str, empty: str) -> Column:
+def _column(name: str, empty: str, prefix: str = '') -> Column:
     """Return the column of a measure, from the measure's own definition."""
     measure = MEASURES[name]
-    return Column(name, NUMBER, measure.unit, measure.definition, measure.reference,
+    return Column(prefix + name, NUMBER, measure.unit, measure.definition, measure.reference,
                   measure.variant, empty)
 
 
@@ -39,10 +39,8 @@ def _vehicles(run: Run) -> Iterator[Row]:
 VEHICLE_BEHAVIOUR = TablePart((
     Column('driven_s', NUMBER, 's', 'time in which commands drove it',
            variant='0 of an AV that followed its plans throughout'),
-    *(Column(f'drive_{name}', NUMBER, column.unit, column.definition, column.reference_point,
-             column.variant, column.empty)
-      for name in _PER_VEHICLE for column in (_column(
-          name, 'there was nothing to measure, or it was not driven by hand'),))), _vehicles)
+    *(_column(name, 'there was nothing to measure, or it was not driven by hand', 'drive_')
+      for name in _PER_VEHICLE)), _vehicles)
 
 _OF = (RUN, Column('vehicle', TEXT, '', 'id of the vehicle'))
 REACTIONS = TableDeclaration(
