@@ -109,7 +109,7 @@ Row = Mapping[str, object]
 @dataclass(frozen=True)
 class TablePart:
     """
-    Some columns of a table whose parts share the same rows: `vehicles`, `events`, `runs`.
+    Some columns of a table whose parts share the same rows: `vehicles`, `runs`.
 
     :param columns: the columns that it fills.
     :param rows: yields the values of a run by column, one mapping for each of the table's rows in

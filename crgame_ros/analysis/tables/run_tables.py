@@ -22,7 +22,7 @@ from crgame_ros.analysis.tables.pairs import CROSSINGS, PAIRS, write_criticality
 from crgame_ros.analysis.tables.plans import plan_rows, PLANS
 from crgame_ros.analysis.tables.runs import RUN_PARTS, RUNS
 from crgame_ros.analysis.tables.states import state_rows, STATES
-from crgame_ros.analysis.tables.tasks import EVENT_PARTS, EVENTS, TASK_TABLES, write_tasks
+from crgame_ros.analysis.tables.tasks import event_rows, EVENTS, TASK_TABLES, write_tasks
 from crgame_ros.analysis.tables.vehicles import VEHICLE_PARTS, VEHICLES
 from crgame_ros.analysis.tables.writer import (
     Format,
@@ -233,5 +233,6 @@ def _add_rows(run: Run, writers: Mapping[str, TableRows]) -> None:
     write_tasks(run, writers)
     write_instruments(run, writers)
     write_gaze(run, writers)
-    for table, parts in ((EVENTS, EVENT_PARTS), (VEHICLES, VEHICLE_PARTS), (RUNS, RUN_PARTS)):
+    writers[EVENTS.name].add_rows(event_rows(run))
+    for table, parts in ((VEHICLES, VEHICLE_PARTS), (RUNS, RUN_PARTS)):
         writers[table.name].add_rows(part_rows(parts, run))

@@ -8,14 +8,12 @@ from crgame_ros.analysis.behaviour.task_events import detection_scores, task_eve
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
     Column,
-    declare,
     INTEGER,
     NUMBER,
     Row,
     RUN,
     step_columns,
     TableDeclaration,
-    TablePart,
     TEXT,
 )
 from crgame_ros.analysis.tables.writer import TableRows
@@ -24,7 +22,8 @@ from crgame_ros.game.events import ACTIONS
 UNKNOWN = 'the game does not know the event: a vehicle touched another object, or was put back'
 
 
-def _fired(run: Run) -> Iterator[Row]:
+def event_rows(run: Run) -> Iterator[Row]:
+    """Yield the rows of the events that took effect."""
     game = run.game
     specs = {spec.name: spec for spec in game.events}
     for event in run.record.fired:
@@ -35,8 +34,8 @@ def _fired(run: Run) -> Iterator[Row]:
                                            'object': spec.object_id})}
 
 
-EVENT_PARTS = (
-    TablePart((
+EVENTS = TableDeclaration(
+    'events', 'an event that took effect', ('run', 'name', 'time_s'), (
         RUN, *step_columns('its effect'),
         Column('name', TEXT, '', 'of the event in the game'),
         Column('kind', TEXT, '', 'what it does', empty=UNKNOWN, values=tuple(ACTIONS)),
@@ -45,10 +44,7 @@ EVENT_PARTS = (
                'had the vehicle put back, or a contact stopped it',
                values=('trigger', 'condition', 'driver', 'contact')),
         Column('object', TEXT, '', 'id of the obstacle that it changes or puts',
-               empty='it changes no obstacle')), _fired),)
-EVENTS = declare('events', 'an event that took effect', ('run', 'name', 'time_s'), EVENT_PARTS)
-
-
+               empty='it changes no obstacle')))
 _TASK = Column('task', TEXT, '', 'name of the task')
 _VEHICLE = Column('vehicle', TEXT, '', 'id of the vehicle whose driver it was for')
 _TIME = Column('time_s', NUMBER, 's', "onset, since the run's start")
