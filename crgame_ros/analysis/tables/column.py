@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 NUMBER, INTEGER, TEXT, FLAG = pa.float64(), pa.int64(), pa.string(), pa.bool_()
 # The types' names in Table Schemas.
 KINDS = {NUMBER: 'number', INTEGER: 'integer', TEXT: 'string', FLAG: 'boolean'}
+# Reference points.
+REAR_AXLE, CENTER, FOOTPRINTS = 'rear axle', 'center', 'footprints, bumper to bumper'
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
     Column,
     FLAG,
+    FOOTPRINTS,
     NUMBER,
     RUN,
     step_columns,
@@ -24,7 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 import pyarrow as pa
 
-FOOTPRINTS = 'footprints, bumper to bumper'
 NOT_THE_LEADER = 'the other is not its leader'
 _BUFFERED_ROWS = 8192
 

@@ -11,6 +11,7 @@ from crgame_ros.analysis.tables.column import (
     FLAG,
     INTEGER,
     NUMBER,
+    REAR_AXLE,
     Row,
     RUN,
     step_columns,
@@ -26,7 +27,6 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-REAR_AXLE = 'rear axle'
 NO_PLAN = 'the answer was not a plan'
 STATE_COLUMNS = (
     ('x', 'm', 'first coordinate', StateColumn.X), ('y', 'm', 'second coordinate', StateColumn.Y),

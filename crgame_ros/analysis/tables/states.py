@@ -6,10 +6,12 @@ from collections.abc import Iterator, Mapping
 
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
+    CENTER,
     Column,
     FLAG,
     INTEGER,
     NUMBER,
+    REAR_AXLE,
     RUN,
     step_columns,
     TableDeclaration,
@@ -29,7 +31,6 @@ import pyarrow as pa
 
 FloatArray = NDArray[np.float64]
 
-REAR_AXLE, CENTER = 'rear axle', 'center'
 OF_OBJECTS = 'of objects, which are not driven in this run'
 OFF_ROAD = 'off the road'
 UNCONSUMED = 'not driven by hand: objects, AVs on their plans, at the start, unrecorded cycles'

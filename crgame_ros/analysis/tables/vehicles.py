@@ -15,19 +15,20 @@ from crgame_ros.analysis.tables.column import (
     Column,
     declare,
     FLAG,
+    FOOTPRINTS,
     INTEGER,
     NUMBER,
+    REAR_AXLE,
     Row,
     RUN,
     TablePart,
     TEXT,
 )
-from crgame_ros.analysis.tables.pairs import FOOTPRINTS, measure_column
+from crgame_ros.analysis.tables.pairs import measure_column
 from crgame_ros.game.documents import DrivenAv, DrivenHuman
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 
-REAR_AXLE = 'rear axle'
 AT_STEPS = 'at the scenario steps'
 NO_LEADER = 'it followed no leader'
 NEVER_NEAR = 'it was never defined: no other was near'
