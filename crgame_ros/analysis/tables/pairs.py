@@ -2,12 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables of criticality: the measures of each pair at each step, and crossings."""
 
-
 from crgame_ros.analysis.criticality.car_following_measures import NO_LEADER
-from crgame_ros.analysis.criticality.criticality import (
-    Criticality,
-    MEASURES,
-)
+from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
 from crgame_ros.analysis.criticality.nearby_footprints import NEAR
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
@@ -76,14 +72,11 @@ def write_criticality(run: Run, pairs: TableRows, crossings: TableRows) -> None:
     collected = _Collected(run, pairs)
     criticality = run.measure(collected.add)
     collected.flush()
-    found = criticality.crossings
-    if found:
-        crossings.add({
-            'run': run.id, 'first': [criticality.ids[each.first] for each in found],
-            'second': [criticality.ids[each.second] for each in found],
-            'entered_s': [each.entered_s for each in found],
-            'pet_s': [each.pet_s for each in found],
-            'is_estimate': [each.is_estimate for each in found]})
+    ids = criticality.ids
+    crossings.add_rows({
+        'run': run.id, 'first': ids[each.first], 'second': ids[each.second],
+        'entered_s': each.entered_s, 'pet_s': each.pet_s, 'is_estimate': each.is_estimate}
+        for each in criticality.crossings)
 
 
 class _Collected:
