@@ -3,6 +3,7 @@
 """The tables of other instruments: channels, samples, gaze, glances and their sums."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import get_args
 
 from crgame_ros.analysis.behaviour.gaze import (
@@ -37,7 +38,6 @@ from crgame_ros.recording.views import read_pictures
 from crgame_ros.roads.surface import lanelet_areas
 from crgame_ros.scenario.loading import parse_scenario
 import numpy as np
-from numpy.typing import NDArray
 import shapely
 
 _STREAM = Column('stream', TEXT, '', 'its name, with the id of its device where two have the same')
@@ -234,22 +234,13 @@ def _add_gaze(same: Mapping[str, object], recorded: RecordedStream, samples: Gaz
 def _add_glances(same: Mapping[str, object], recorded: RecordedStream, found: LookedAt,
                  writers: Mapping[str, TableRows]) -> None:
     made = glances(recorded.steady_s, found)
-    if not made:
-        return
     known = np.flatnonzero(np.isfinite(recorded.steady_s))
     known = known[np.argsort(recorded.steady_s[known], kind='stable')]
-
-    def in_run_s(steady_s: list[float]) -> NDArray[np.float64]:
-        return np.interp(steady_s, recorded.steady_s[known], recorded.times_s[known])
-    writers[GLANCES.name].add({
-        **same, 'number': range(len(made)), 'time_s': in_run_s([each.start_s for each in made]),
-        'kind': [each.area.kind for each in made], 'object': [each.area.object for each in made],
-        'duration_s': [each.duration_s for each in made],
-        'transition_s': [each.transition_s for each in made],
-        'dwell_s': [each.dwell_s for each in made]})
-    sums = glance_sums(made)
-    names = ('kind', 'glances', 'total_s', 'mean_s', 'longest_s', 'share')
-    writers[GLANCE_SUMS.name].add({
-        **same, 'object': [each.object or 'all' for each in sums],
-        'first_s': in_run_s([each.first_s for each in sums]),
-        **{name: [getattr(each, name) for each in sums] for name in names}})
+    in_run_s = partial(np.interp, xp=recorded.steady_s[known], fp=recorded.times_s[known])
+    writers[GLANCES.name].add_rows({
+        **same, **each.area._asdict(), 'number': number, 'time_s': in_run_s(each.start_s),
+        'duration_s': each.duration_s, 'transition_s': each.transition_s, 'dwell_s': each.dwell_s}
+        for number, each in enumerate(made))
+    writers[GLANCE_SUMS.name].add_rows({
+        **same, **each._asdict(), 'object': each.object or 'all',
+        'first_s': in_run_s(each.first_s)} for each in glance_sums(made))
