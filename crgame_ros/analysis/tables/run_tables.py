@@ -3,10 +3,9 @@
 """Fills all tables of runs, and writes them into a folder."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 import json
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from crgame_ros.analysis.runs.run import Run, RunProgress, Scoring
 from crgame_ros.analysis.tables.behaviour import BEHAVIOUR_TABLES, write_behaviour
@@ -40,90 +39,57 @@ import pyarrow as pa
 _LARGEST_PACKAGE = 10_000_000
 
 
-class TableFolder:
+@contextmanager
+def table_folder(out: Path, declarations: Sequence[TableDeclaration], file_format: Format,
+                 name: str) -> Iterator[dict[str, TableWriter]]:
     """
-    A folder of tables, which are written under temporary names and renamed once all are complete.
+    Yield the writers of a folder of tables, by table, whose files appear once all are complete.
 
     The old dictionary is removed first and the new one written last. If a dictionary is present,
     all tables that it names are complete and from one export. Only an earlier export of this
     program is replaced.
 
     :param out: the folder; it is created if it is missing.
-    :param declarations: declarations of the tables.
-    :param file_format: Parquet or CSV.
     :param name: name of the data package.
-    :ivar writers: writers by table name.
     :raises InputError: if the folder cannot be written, or a file of another program is in the
         way.
     """
-
-    def __init__(self, out: Path, declarations: tuple[TableDeclaration, ...], file_format: Format,
-                 name: str) -> None:
-        prepare_folder(out)
-        self._out, self._format, self._name = out, file_format, name
-        self._earlier = _earlier(out)
-        self._declarations = declarations
-        self._names = {table.name: f'{table.name}.{file_format}' for table in declarations}
-        for file in (*self._names.values(), PACKAGE_FILE):
-            if (out / file).exists() and file not in self._earlier:
-                raise InputError('a file that is no exported table is there already',
-                                 str(out / file), 'name another folder')
-        self._parts = {table.name: part_of(out / self._names[table.name])
-                       for table in declarations}
-        self.writers: dict[str, TableWriter] = {}
-
-    def __enter__(self) -> Self:
-        try:
-            for table in self._declarations:
-                self.writers[table.name] = TableWriter(
-                    table, self._parts[table.name], self._format)
-        except OSError as error:
-            self._discard()
-            raise self._refusal(error) from error
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
-        try:
-            if error is None:
-                self._finish()
-        except (OSError, pa.ArrowInvalid) as failure:
-            raise self._refusal(failure) from failure
-        finally:
-            self._discard()
-        if isinstance(error, OSError):
-            raise self._refusal(error) from error
-
-    def _finish(self) -> None:
-        written = []
-        for table in self._declarations:
-            self.writers[table.name].close()
-            written.append(WrittenTable(table, self._parts[table.name], self._names[table.name],
-                                        self.writers[table.name].rows))
-        package = data_package(written, self._format, self._name)
-        (self._out / PACKAGE_FILE).unlink(missing_ok=True)
-        for name in self._earlier - {*self._names.values(), PACKAGE_FILE}:
-            (self._out / name).unlink(missing_ok=True)
-        for file in written:
-            name_whole(file.path, self._out / file.name)
+    prepare_folder(out)
+    earlier = _earlier(out)
+    files = {table.name: f'{table.name}.{file_format}' for table in declarations}
+    for file in (*files.values(), PACKAGE_FILE):
+        if (out / file).exists() and file not in earlier:
+            raise InputError('a file that is no exported table is there already',
+                             str(out / file), 'name another folder')
+    parts = {table: part_of(out / file) for table, file in files.items()}
+    writers: dict[str, TableWriter] = {}
+    try:
+        for declaration in declarations:
+            writers[declaration.name] = TableWriter(
+                declaration, parts[declaration.name], file_format)
+        yield writers
+        for writer in writers.values():
+            writer.close()
+        package = data_package([
+            WrittenTable(writer.declaration, parts[table], files[table], writer.rows)
+            for table, writer in writers.items()], file_format, name)
+        for file in (PACKAGE_FILE, *(earlier - set(files.values()))):
+            (out / file).unlink(missing_ok=True)
+        for table, part in parts.items():
+            name_whole(part, out / files[table])
         write_text(json.dumps(package, indent=1, ensure_ascii=False, allow_nan=False) + '\n',
-                   self._out / PACKAGE_FILE)
-
-    def _discard(self) -> None:
-        """Remove unfinished files."""
-        for writer in self.writers.values():
-            try:
-                writer.release()
-            except (OSError, pa.ArrowInvalid):
-                # The disk may be full; the partial file is removed anyway.
-                continue
-        for part in self._parts.values():
-            part.unlink(missing_ok=True)
-
-    def _refusal(self, error: BaseException) -> InputError:
+                   out / PACKAGE_FILE)
+    except (OSError, pa.ArrowInvalid) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        return InputError(f'cannot be written ({reason})', str(self._out),
-                          'choose a folder that can be written, on a disk with room')
+        raise InputError(f'cannot be written ({reason})', str(out),
+                         'choose a folder that can be written, on a disk with room') from error
+    finally:
+        # What is unfinished is removed, even where the disk is full.
+        for writer in writers.values():
+            with suppress(OSError, pa.ArrowInvalid):
+                writer.release()
+        for part in parts.values():
+            part.unlink(missing_ok=True)
 
 
 def _earlier(out: Path) -> set[str]:
@@ -193,10 +159,10 @@ def write_tables(runs: Iterable[Run], out: Path, file_format: Format) -> dict[st
     :return: number of rows by table.
     :raises InputError: if a scenario cannot be used, or the folder cannot be written.
     """
-    with TableFolder(out, TABLES, file_format, 'tables') as folder:
+    with table_folder(out, TABLES, file_format, 'tables') as writers:
         for run in runs:
-            _add_run(run, folder.writers)
-        return {name: writer.rows for name, writer in folder.writers.items()}
+            _add_run(run, writers)
+        return {name: writer.rows for name, writer in writers.items()}
 
 
 def tables_of(runs: Iterable[Run]) -> dict[str, pa.Table]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from crgame_ros.analysis.tables.column import Column, INTEGER, RUN, TableDeclaration, TEXT
-from crgame_ros.analysis.tables.run_tables import TableFolder
+from crgame_ros.analysis.tables.run_tables import table_folder
 from crgame_ros.errors import InputError
 import polars
 import pytest
@@ -21,8 +21,8 @@ TABLES = tuple(TableDeclaration(name, 'a row', ('run',), (
 def fill(out: Path, number: int, file_format: Any = 'parquet',
          error: BaseException | None = None) -> None:
     """Write a row into each table, and fail then where an error is given."""
-    with TableFolder(out, TABLES, file_format, 'trial') as folder:
-        for writer in folder.writers.values():
+    with table_folder(out, TABLES, file_format, 'trial') as writers:
+        for writer in writers.values():
             writer.add({'run': ['a'], 'number': [number]})
         if error is not None:
             raise error
