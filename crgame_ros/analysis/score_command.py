@@ -68,8 +68,7 @@ def score(values: argparse.Namespace) -> int:
     if values.out is not None:
         _write(found, values.out)
     if values.json:
-        told = [each.as_dict() for each in found]
-        print(json.dumps(told[0] if len(told) == 1 else told, indent=2, allow_nan=False))
+        print(_json(found))
     else:
         print('\n'.join(line for each in found for line in _lines(each)))
         if values.out is not None:
@@ -139,9 +138,12 @@ def _write(found: 'list[PlannerScores]', out: Path) -> None:
         for solution in vehicle.commonroad.solutions(scores.scenario_id).values():
             write_text(solution_text(dated(solution, when)),
                        out / solution_name(solution, vehicle.vehicle_id))
+    write_text(f'{_json(found)}\n', out / 'scores.json')
+
+
+def _json(found: 'list[PlannerScores]') -> str:
     told = [each.as_dict() for each in found]
-    write_text(json.dumps(told[0] if len(told) == 1 else told, indent=2, allow_nan=False) + '\n',
-               out / 'scores.json')
+    return json.dumps(told[0] if len(told) == 1 else told, indent=2, allow_nan=False)
 
 
 def _lines(found: 'PlannerScores') -> Iterator[str]:
