@@ -11,7 +11,7 @@ import platform
 from typing import Any
 
 from crgame_ros.analysis.counterfactual import Alternative
-from crgame_ros.analysis.pictures.critical_moments import critical_moments, Touch
+from crgame_ros.analysis.pictures.critical_moments import critical_moments
 from crgame_ros.analysis.pictures.figure_style import figure_bytes
 from crgame_ros.analysis.pictures.frames_figure import frames_figure
 from crgame_ros.analysis.pictures.profiles_figure import profiles_figure
@@ -74,8 +74,7 @@ def write_run_figures(run: Alternative, numbers: tuple[int, int], name: str, fol
     log = run.log
     record = RunRecord(log, np.empty(0, dtype=np.int64),
                        np.empty((0, len(log.vehicles), len(COMMAND_COLUMNS))), ())
-    moments = critical_moments(record, run.criticality,
-                               tuple(map(Touch.from_entry, run.contacts or ())))
+    moments = critical_moments(record, run.criticality, run.contacts or ())
     scene = FrameScene(log)
     frames, profiles = numbers
     written = list(_write(frames_figure(scene, _panel_steps(run)),

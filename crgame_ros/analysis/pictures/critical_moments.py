@@ -38,19 +38,6 @@ class Moment(NamedTuple):
     vehicles: tuple[str, ...]
 
 
-class Touch(NamedTuple):
-    """An entry of `contacts` in `timing.json`."""
-
-    vehicle_id: str
-    other_id: str
-    n: int
-
-    @classmethod
-    def from_entry(cls, entry: ContactEntry) -> 'Touch':
-        """Read one."""
-        return cls(entry['vehicle'], entry['with'], entry['n'])
-
-
 class _Ranked(NamedTuple):
     """A moment with its rank, smaller first."""
 
@@ -60,7 +47,7 @@ class _Ranked(NamedTuple):
 
 
 def critical_moments(record: RunRecord, criticality: Criticality,
-                     contacts: Sequence[Touch] = ()) -> tuple[Moment, ...]:
+                     contacts: Sequence[ContactEntry] = ()) -> tuple[Moment, ...]:
     """
     Return the moments of a run, the most critical one first.
 
@@ -69,11 +56,12 @@ def critical_moments(record: RunRecord, criticality: Criticality,
     vehicle. A moment within `TOGETHER_S` of a more critical one becomes part of it, at its time.
 
     :param criticality: criticality of the same run (`measure_log`).
-    :param contacts: contacts of the run.
+    :param contacts: of the run, as in `timing.json`; those of unknown steps are left out.
     """
     scheduler = record.log.game.scheduler
     dt_s = scheduler.dt_s
-    found = [_contact(item.n * dt_s, (item.vehicle_id, item.other_id)) for item in contacts]
+    found = [_contact(item['n'] * dt_s, (item['vehicle'], item['with'])) for item in contacts
+             if item['n'] is not None]
     found += _critical(criticality)
     found += [_Ranked(_EVENT, event.n * dt_s, Moment(
         event.n * dt_s, f'event {event.name}', ())) for event in record.fired]

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:  # They take a second to import, and only measures need them.
     from crgame_ros.analysis.behaviour.driver import DriverBehaviour
     from crgame_ros.analysis.criticality.criticality import Criticality
-    from crgame_ros.analysis.pictures.critical_moments import Moment, Touch
+    from crgame_ros.analysis.pictures.critical_moments import Moment
     from crgame_ros.analysis.pictures.scene_frame import FrameScene
     from crgame_ros.analysis.pictures.timing_figure import TimedRun
     from crgame_ros.analysis.rules.vehicle_rules import VehicleRules
@@ -325,13 +325,6 @@ class Run:
         return scores_of(self.record, self.answers, drives_only=self.scoring == 'drives',
                          progress=self.telling('scoring'))
 
-    @property
-    def touches(self) -> 'tuple[Touch, ...]':
-        """Return its contacts for pictures; without cycles, their steps are unknown."""
-        from crgame_ros.analysis.pictures.critical_moments import Touch
-        return tuple(Touch.from_entry(item) for item in self.contacts or ()
-                     if item['n'] is not None)
-
     @cached_property
     def story(self) -> 'tuple[Moment, ...]':
         """Find the moments that a report shows, in order of time."""
@@ -342,7 +335,7 @@ class Run:
     def moments(self) -> 'tuple[Moment, ...]':
         """Find its moments, the most critical one first."""
         from crgame_ros.analysis.pictures.critical_moments import critical_moments
-        return critical_moments(self.record, self.usual_criticality, self.touches)
+        return critical_moments(self.record, self.usual_criticality, self.contacts or ())
 
     def telling(self, what: str) -> Callable[[float], object]:
         """Return the function to call with the share done of some work, as in `reading`."""

@@ -5,10 +5,11 @@
 from collections.abc import Callable
 
 from crgame_ros.analysis.criticality.recorded import measure_log
-from crgame_ros.analysis.pictures.critical_moments import critical_moments, Moment, Touch
+from crgame_ros.analysis.pictures.critical_moments import critical_moments, Moment
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.recording.run_trajectories import RunTrajectories
+from crgame_ros.simulation.contacts import ContactEntry
 import numpy as np
 import pytest
 
@@ -48,8 +49,10 @@ def test_contacts_come_first_events_after_what_is_critical(straight: Make) -> No
     """This holds for any times; within a second the more critical one includes the other."""
     log, _ = _approach(straight, 30, 40)
     fired = [FiredEvent('brake', 600, 60, 'trigger'), FiredEvent('gone', 300, 30, 'condition')]
-    moments = critical_moments(_record(log, *fired), measure_log(log),
-                               [Touch('hv0', 'o7', 450)])
+    contact: ContactEntry = {
+        'vehicle': 'hv0', 'with': 'o7', 'n': 450, 'side': 'front', 'kind': 'stopped_track',
+        'speed': 10.0, 'other_speed': 0.0, 'avoidable_by': 'hv0'}
+    moments = critical_moments(_record(log, *fired), measure_log(log), [contact])
     assert [each.time_s for each in moments] == pytest.approx([4.5, 2.9, 6.0])
     assert moments[0] == Moment(4.5, 'hv0 and o7 touch', ('hv0', 'o7'))
     assert moments[1].why.endswith('event gone; hv0 and av0 are '
