@@ -18,7 +18,6 @@ from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_step
 from crgame_ros.analysis.pictures.profiles_figure import (
     draw_line,
     draw_over_time,
-    log_times,
     OVER_TIME,
     profiles_figure,
 )
@@ -119,8 +118,8 @@ def _draw_distances(axes: Axes, record: RunRecord, scene: FrameScene) -> None:
     for i, item in enumerate(log.vehicles):
         if item.role is Role.AUTONOMOUS:
             away = log.vehicle_states[:, i, :2] - log.vehicle_states[:, human, :2]
-            draw_line(axes, log_times(record), np.hypot(*away.T), item.id, scene.styles, i)
-    axes.set_xlim(*log_times(record)[[0, -1]])
+            draw_line(axes, log.times_s, np.hypot(*away.T), item.id, scene.styles, i)
+    axes.set_xlim(*log.times_s[[0, -1]])
 
 
 if __name__ == '__main__':

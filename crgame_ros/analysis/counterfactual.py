@@ -147,9 +147,8 @@ def _compare(planner: str, record: RunRecord, outcome: RunReport,
 def _differs_s(log: RunTrajectories, recorded: RunTrajectories, found: NDArray[np.float64],
                expected: NDArray[np.float64]) -> float | None:
     """Return the time at which poses (K, N, 3) of two runs begin to differ, None if never."""
-    ks, here, there = np.intersect1d(log.ks, recorded.ks, return_indices=True)
+    _, here, there = np.intersect1d(log.ks, recorded.ks, return_indices=True)
     apart = np.abs(found[here] - expected[there]) > SAME
     absent = np.isnan(found[here]) != np.isnan(expected[there])
     rows = np.flatnonzero((apart | absent).any(axis=(1, 2)))
-    scheduler = recorded.game.scheduler
-    return float((ks[rows[0]] - scheduler.k0) * scheduler.time_step_s) if len(rows) else None
+    return float(recorded.times_s[there[rows[0]]]) if len(rows) else None

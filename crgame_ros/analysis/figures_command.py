@@ -146,14 +146,13 @@ def _frames(run: 'Run', values: argparse.Namespace, times_s: list[float] | None
             ) -> Iterator[tuple[str, 'Figure', str]]:
     """Yield the figures of frames with their names and captions."""
     from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps
-    scene, log = run.scene, run.log
-    scheduler = log.game.scheduler
+    scene = run.scene
     if times_s is not None:
-        ends = [(int(k) - scheduler.k0) * scheduler.time_step_s for k in log.ks[[0, -1]]]
+        first_s, last_s = run.times_s[[0, -1]].tolist()
         for time_s in times_s:
-            if not ends[0] - 1e-6 <= time_s <= ends[1] + 1e-6:
+            if not first_s - 1e-6 <= time_s <= last_s + 1e-6:
                 raise InputError(f'{time_s:g} s is not in it', run.name,
-                                 f'it lasts from {ends[0]:g} to {ends[1]:g} s')
+                                 f'it lasts from {first_s:g} to {last_s:g} s')
         yield 'frames', frames_figure(scene, [scene.k_at(each) for each in times_s],
                                       columns=values.columns), f'{run.name} at {values.at} s'
         return

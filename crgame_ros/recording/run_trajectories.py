@@ -91,6 +91,12 @@ class RunTrajectories:
         return self.descriptions[self.vehicle_states.shape[1]:]
 
     @property
+    def times_s(self) -> FloatArray:
+        """Return the times of the scenario steps since the run's start (K) [s]."""
+        scheduler = self.game.scheduler
+        return np.asarray((self.ks - scheduler.k0) * scheduler.time_step_s)
+
+    @property
     def road_transforms(self) -> tuple[RigidTransform, ...]:
         """Return the transform of each driven vehicle to the road's coordinates (CRG 28)."""
         return self.game.road_transforms

@@ -58,14 +58,13 @@ def critical_moments(record: RunRecord, criticality: Criticality,
     :param criticality: criticality of the same run (`measure_log`).
     :param contacts: of the run, as in `timing.json`; those of unknown steps are left out.
     """
-    scheduler = record.log.game.scheduler
-    dt_s = scheduler.dt_s
+    dt_s = record.log.game.scheduler.dt_s
     found = [_contact(item['n'] * dt_s, (item['vehicle'], item['with'])) for item in contacts
              if item['n'] is not None]
     found += _critical(criticality)
     found += [_Ranked(_EVENT, event.n * dt_s, Moment(
         event.n * dt_s, f'event {event.name}', ())) for event in record.fired]
-    found += _close(criticality, (record.log.ks[0] - scheduler.k0) * scheduler.time_step_s)
+    found += _close(criticality, float(record.log.times_s[0]))
     moments: list[Moment] = []
     for _, _, moment in sorted(found):
         for place, other in enumerate(moments):
@@ -141,10 +140,7 @@ def story_moments(record: RunRecord, criticality: Criticality,
 
     :param critical: the critical ones, the most critical one first.
     """
-    log = record.log
-    scheduler = log.game.scheduler
-    first_s, last_s = ((int(k) - scheduler.k0) * scheduler.time_step_s
-                       for k in (log.ks[0], log.ks[-1]))
+    first_s, last_s = record.log.times_s[[0, -1]].tolist()
     ends = [Moment(first_s, 'start', ()), Moment(last_s, 'end', ())]
     found = list(critical)
     found += [Moment(worst.time_s, f'{MEASURES[name].label} of {vehicle.vehicle_id} to '

@@ -82,22 +82,12 @@ def profiles_figure(record: RunRecord, moments: Sequence[Moment] = (),
     return figure
 
 
-def log_times(record: RunRecord) -> FloatArray:
-    """Return the times of a log's rows since the start of the run (K) [s]."""
-    scheduler = record.log.game.scheduler
-    return np.asarray((record.log.ks - scheduler.k0) * scheduler.time_step_s)
-
-
-def values_of(record: RunRecord, column: StateColumn) -> FloatArray:
-    """Return a column of the states (K, V) for drawing; headings are unwrapped beyond pi."""
-    values = record.log.vehicle_states[:, :, column]
-    return np.asarray(np.unwrap(values, axis=0) if column is StateColumn.YAW else values)
-
-
 def draw_over_time(axes: Axes, record: RunRecord, styles: dict[str, VehicleStyle],
                    column: StateColumn, label: str) -> None:
-    """Draw a column of the states of all driven vehicles over time."""
-    times_s, values = log_times(record), values_of(record, column)
+    """Draw a column of the states of all driven vehicles over time; headings go beyond pi."""
+    times_s, values = record.log.times_s, record.log.vehicle_states[:, :, column]
+    if column is StateColumn.YAW:
+        values = np.unwrap(values, axis=0)
     for i, item in enumerate(record.log.vehicles):
         draw_line(axes, times_s, values[:, i], item.id, styles, i)
     axes.set_ylabel(label)

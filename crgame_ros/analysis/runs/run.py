@@ -171,8 +171,7 @@ class Run:
     @property
     def times_s(self) -> FloatArray:
         """Return the times of the log's scenario steps since the run's start (K) [s]."""
-        scheduler = self.game.scheduler
-        return np.asarray((self.log.ks - scheduler.k0) * scheduler.time_step_s)
+        return self.log.times_s
 
     def steps_of(self, ks: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the simulation steps n of scenario steps k."""
