@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
+from string import ascii_lowercase
 from typing import Any
 
 from crgame_ros.game.objects import ObjectDescription, Role
@@ -82,6 +83,11 @@ def new_figure(columns: int, height: float) -> Figure:
     figure = Figure(figsize=(WIDTHS[columns], height), layout='constrained')
     FigureCanvasAgg(figure)
     return figure
+
+
+def panel_letter(number: int) -> str:
+    """Return what distinguishes a panel of a figure: (a), (b), … (z), (27), …."""
+    return f'({ascii_lowercase[number]})' if number < len(ascii_lowercase) else f'({number + 1})'
 
 
 def figure_bytes(figure: Figure, file_format: str, resolution: int = RESOLUTION) -> bytes:

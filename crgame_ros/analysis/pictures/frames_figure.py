@@ -3,7 +3,6 @@
 """Figures of frames: panels at one scale (as CRG figures 8, 10, 12)."""
 
 from collections.abc import Sequence
-from string import ascii_lowercase
 
 from crgame_ros.analysis.pictures.figure_style import (
     AV_COLOURS,
@@ -11,6 +10,7 @@ from crgame_ros.analysis.pictures.figure_style import (
     INK,
     new_figure,
     OBJECT_COLOUR,
+    panel_letter,
     paper_style,
     PERSON_COLOUR,
     tint,
@@ -66,7 +66,7 @@ def frames_figure(scene: FrameScene, ks: Sequence[int], vehicles: Sequence[str] 
                 (total - (row + 1) * height * metre - row * GAP) / total,
                 length * metre / width, height * metre / total))
             draw_frame(axes, frame, metre,
-                       f'{_letter(number)} {frame.time_s:.{digits}f} s')
+                       f'{panel_letter(number)} {frame.time_s:.{digits}f} s')
         figure.legend(handles=handles, loc='lower left', ncols=4 * columns, borderaxespad=0.1,
                       bbox_to_anchor=(0.0, 0.0), handlelength=1.6, columnspacing=1.2,
                       handletextpad=0.5, borderpad=0.1, labelspacing=0.4)
@@ -119,10 +119,6 @@ def _draw_scale(figure: Figure, metre: float, y: float) -> None:
                                  linewidth=0.8, solid_capstyle='butt'))
     figure.text((left - 4.0) / width, y / height, f'{bar} m', ha='right', va='center',
                 fontsize=7.0)
-
-
-def _letter(number: int) -> str:
-    return f'({ascii_lowercase[number]})' if number < len(ascii_lowercase) else f'({number + 1})'
 
 
 def _digits(step_s: float) -> int:

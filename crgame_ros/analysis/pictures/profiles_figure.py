@@ -3,13 +3,13 @@
 """Profiles of the driven vehicles over a run (as CRG figures 9, 11 and 13)."""
 
 from collections.abc import Sequence
-from string import ascii_lowercase
 from typing import Any
 
 from crgame_ros.analysis.pictures.critical_moments import Moment
 from crgame_ros.analysis.pictures.figure_style import (
     INK,
     new_figure,
+    panel_letter,
     paper_style,
     vehicle_styles,
     VehicleStyle,
@@ -64,7 +64,7 @@ def profiles_figure(record: RunRecord, moments: Sequence[Moment] = (),
         grid = figure.add_gridspec(down, across)
         for number, profile in enumerate(profiles):
             axes = figure.add_subplot(grid[divmod(number, across)])
-            letter = f'({ascii_lowercase[number]})'
+            letter = panel_letter(number)
             if profile == POSITION:
                 _draw_positions(axes, record, styles)
                 axes.set_xlabel(f'x [m]\n{letter}', linespacing=1.1)

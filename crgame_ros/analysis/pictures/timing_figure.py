@@ -4,13 +4,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from string import ascii_lowercase
 
 from crgame_ros.analysis.pictures.figure_style import (
     AV_COLOURS,
     HUMAN_COLOURS,
     INK,
     new_figure,
+    panel_letter,
     paper_style,
 )
 from crgame_ros.timing.cycle_rows import CycleTable
@@ -86,9 +86,9 @@ def timing_figure(runs: Sequence[TimedRun], columns: int = 2) -> Figure:
 
 
 def _title(number: int, label: str, what: str) -> str:
-    letter = f'({ascii_lowercase[number]})' if number < len(ascii_lowercase) else f'({number + 1})'
     # An unescaped dollar sign would begin a formula.
-    return f'{letter} ' + (f'{label}: {what}'.replace('$', r'\$') if label else what.capitalize())
+    words = f'{label}: {what}'.replace('$', r'\$') if label else what.capitalize()
+    return f'{panel_letter(number)} {words}'
 
 
 def _draw_timelines(axes: Axes, run: TimedRun, title: str) -> None:
