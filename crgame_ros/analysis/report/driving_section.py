@@ -11,7 +11,6 @@ from crgame_ros.analysis.behaviour.task_events import detection_scores, task_eve
 from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import (
     colours_of,
-    Dash,
     free,
     note,
     NOTHING,
@@ -22,6 +21,7 @@ from crgame_ros.analysis.report.section import (
     PlotSpan,
     Section,
     table,
+    vehicle_line,
 )
 from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.runs.run import Run
@@ -81,10 +81,8 @@ def driving_section(run: Run) -> Section | None:
         told = list(rows)
         if told:
             html += table(caption, head, told, 'numbers')
-    lines = tuple(PlotLine(
-        each.vehicle_id, each.times_s, each.tlc_s, colours_of(run)[each.vehicle_id],
-        dash_of(item.role)) for each, item in zip(
-            run.usual_behaviour, run.log.vehicles, strict=True) if each in found)
+    lines = tuple(vehicle_line(run, i, each.times_s, each.tlc_s)
+                  for i, each in enumerate(run.usual_behaviour) if each in found)
     return Section('driving', 'How people drove', html, (
         Plot('tlc', 'Time to lane crossing (TLC)', 's', lines, bounds=(0.0, _SHOWN_S)),))
 
@@ -183,24 +181,17 @@ def motion_section(run: Run) -> Section:
     html = table('How the driven vehicles moved', (
         'vehicle', 'way [m]', 'mean speed [m/s]', 'least [m/s]', 'greatest [m/s]',
         'hardest braking [m/s²]', 'hardest acceleration [m/s²]'), rows, 'numbers')
-    colours = colours_of(run)
+    everyone = range(len(run.vehicles))
     profiles = [
         Plot(key, title, unit, tuple(
-            PlotLine(item.id, run.times_s, _unwrapped(states[:, i, column], column),
-                     colours[item.id], dash_of(item.role))
-            for i, item in enumerate(run.log.vehicles)))
+            vehicle_line(run, i, run.times_s, _unwrapped(states[:, i, column], column))
+            for i in everyone))
         for key, title, unit, column in _PROFILES]
     ways = Plot('ways', 'Ways of the rear axles in the map, and of others', 'm', (
         *_others_ways(run),
-        *(PlotLine(item.id, states[:, i, StateColumn.X], states[:, i, StateColumn.Y],
-                   colours[item.id], dash_of(item.role))
-          for i, item in enumerate(run.log.vehicles))), plane=True)
+        *(vehicle_line(run, i, states[:, i, StateColumn.X], states[:, i, StateColumn.Y])
+          for i in everyone)), plane=True)
     return Section('motion', 'Speeds, headings, positions', html, (*profiles, ways))
-
-
-def dash_of(role: Role) -> Dash:
-    """Return the dash of a role's lines, for readers who cannot distinguish colours."""
-    return 'solid' if role is Role.HUMAN else 'dash'
 
 
 def _unwrapped(values: FloatArray, column: StateColumn) -> FloatArray:
@@ -238,8 +229,8 @@ def input_section(run: Run) -> Section | None:
                 (span.label, number(span.start_s), number(span.end_s)) for span in spans],
             'numbers')
     plots = tuple(Plot(key, title, unit, tuple(
-        PlotLine(item.id, record.times_s, record.commands[:, i, COMMAND_COLUMNS.index(key)],
-                 colours_of(run)[item.id], dash_of(item.role)) for i, item in vehicles),
+        vehicle_line(run, i, record.times_s, record.commands[:, i, COMMAND_COLUMNS.index(key)])
+        for i, _ in vehicles),
         spans=spans, bounds=bounds) for key, title, unit, bounds in _INPUTS) if rows else ()
     return Section('inputs', 'Driver inputs', html, plots)
 

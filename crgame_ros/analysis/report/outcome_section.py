@@ -13,10 +13,8 @@ from crgame_ros.analysis.criticality.criticality import (
 from crgame_ros.analysis.criticality.headways import SHORT_S
 from crgame_ros.analysis.criticality.thresholds import Thresholds
 from crgame_ros.analysis.pictures.critical_moments import TWICE
-from crgame_ros.analysis.report.driving_section import dash_of
 from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import (
-    colours_of,
     free,
     marked,
     note,
@@ -25,10 +23,10 @@ from crgame_ros.analysis.report.section import (
     plain,
     Plot,
     PlotLimit,
-    PlotLine,
     Section,
     share,
     table,
+    vehicle_line,
 )
 from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES
@@ -188,8 +186,8 @@ def _plots(run: Run, limits: Thresholds) -> Iterator[Plot]:
             continue
         unit = measure.symbol
         yield Plot(name.replace('_', '-'), measure.label, unit, tuple(
-            PlotLine(item.id, run.times_s, values[i], colours_of(run)[item.id], dash_of(item.role))
-            for i, item in enumerate(run.log.vehicles)), lines_at.get(name, ()),
+            vehicle_line(run, i, run.times_s, row) for i, row in enumerate(values)),
+            lines_at.get(name, ()),
             bounds=_bounds(name, unit, values, limits))
 
 

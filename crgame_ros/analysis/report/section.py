@@ -125,6 +125,18 @@ def colours_of(run: 'Run') -> dict[str, str]:
     return found
 
 
+def vehicle_line(run: 'Run', i: int, xs: NDArray[np.float64],
+                 ys: NDArray[np.float64]) -> PlotLine:
+    """
+    Return a line of a driven vehicle; its dash is for readers who cannot distinguish colours.
+
+    :param i: number of the vehicle in the log.
+    """
+    item = run.log.vehicles[i]
+    return PlotLine(item.id, xs, ys, colours_of(run)[item.id],
+                    'solid' if item.role is Role.HUMAN else 'dash')
+
+
 def plain(value: object) -> str:
     """Escape text for a place where no markup is allowed, such as `<title>`."""
     text = str(value)
