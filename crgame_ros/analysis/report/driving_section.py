@@ -6,11 +6,13 @@ from collections.abc import Iterator, Sequence
 import math
 
 from crgame_ros.analysis.behaviour.driver import DriverBehaviour
+from crgame_ros.analysis.behaviour.gaps_accepted import Neighbour
 from crgame_ros.analysis.behaviour.measures import MEASURES
-from crgame_ros.analysis.behaviour.task_events import detection_scores, task_events, TaskEvent
+from crgame_ros.analysis.behaviour.task_events import detection_scores, task_events
 from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import (
     colours_of,
+    filled_table,
     free,
     note,
     NOTHING,
@@ -67,20 +69,27 @@ def driving_section(run: Run) -> Section | None:
                 'cut out of the deviation in the lane.')
     html += table('How people drove', (
         'measure', 'unit', *(named(run, each.vehicle_id) for each in found)),
-        list(_measures(found)), 'numbers')
-    for rows, caption, head in (
-            (_reactions(run, found), 'Reactions to events', (
-                'driver', 'event', 'at [s]', 'throttle released after [s]', 'braked after [s]',
-                'steered after [s]')),
-            (_lane_changes(run, found), 'Gaps accepted', (
-                'driver', 'side', 'first wheel across at [s]', 'leader', 'time gap to it [s]',
-                'follower', 'time gap to it [s]')),
-            (_take_over_rows(run, found), 'Take-overs', (
-                'vehicle', 'asked for by', 'from [s]', 'to [s]', 'hands on after [s]',
-                'first stable second after [s]'))):
-        told = list(rows)
-        if told:
-            html += table(caption, head, told, 'numbers')
+        _measures(found), 'numbers')
+    html += filled_table('Reactions to events', (
+        'driver', 'event', 'at [s]', 'throttle released after [s]', 'braked after [s]',
+        'steered after [s]'), (
+            (named(run, driver.vehicle_id), free(each.event), moment(run, each.event_s),
+             *map(number, each.reaction))
+            for driver in found for each in driver.reactions))
+    html += filled_table('Gaps accepted', (
+        'driver', 'side', 'first wheel across at [s]', 'leader', 'time gap to it [s]',
+        'follower', 'time gap to it [s]'), (
+            (named(run, driver.vehicle_id), each.side, number(each.time_s, 1),
+             *_gap(run, each.leader, each.gap.leader),
+             *_gap(run, each.follower, each.gap.follower))
+            for driver in found for each in driver.lane_changes))
+    html += filled_table('Take-overs', (
+        'vehicle', 'asked for by', 'from [s]', 'to [s]', 'hands on after [s]',
+        'first stable second after [s]'), (
+            (named(run, driver.vehicle_id), free('' if each.request is None else each.request.by),
+             number(each.seat_s, 1), number(each.end_s, 1), number(each.to_hands_on_s),
+             number(each.to_stable_s))
+            for driver in found for each in driver.take_overs))
     lines = tuple(vehicle_line(run, i, each.times_s, each.tlc_s)
                   for i, each in enumerate(run.usual_behaviour) if each in found)
     return Section('driving', 'How people drove', html, (
@@ -97,30 +106,10 @@ def _measures(found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
                    *map(number, values))
 
 
-def _reactions(run: Run, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
-    for driver in found:
-        for each in driver.reactions:
-            yield (named(run, driver.vehicle_id), free(each.event), moment(run, each.event_s),
-                   *map(number, each.reaction))
-
-
-def _lane_changes(run: Run, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
-    for driver in found:
-        for each in driver.lane_changes:
-            yield (named(run, driver.vehicle_id), each.side, number(each.time_s, 1),
-                   *(text for name, gap in ((each.leader, each.gap.leader),
-                                            (each.follower, each.gap.follower))
-                     for text in (named(run, name) if name else number(None),
-                                  number(None if gap is None else gap.time_gap_s))))
-
-
-def _take_over_rows(run: Run, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
-    for driver in found:
-        for each in driver.take_overs:
-            yield (named(run, driver.vehicle_id),
-                   free('' if each.request is None else each.request.by),
-                   number(each.seat_s, 1), number(each.end_s, 1), number(each.to_hands_on_s),
-                   number(each.to_stable_s))
+def _gap(run: Run, name: str | None, gap: Neighbour | None) -> tuple[str, str]:
+    """Return the cells on a vehicle in the lane entered: who, and the time gap to it."""
+    return (named(run, name) if name else NOTHING,
+            number(None if gap is None else gap.time_gap_s))
 
 
 def task_section(run: Run) -> Section | None:
@@ -130,41 +119,26 @@ def task_section(run: Run) -> Section | None:
         return None
     html = note('Response times are of the page that showed the light, from the picture in which '
                 'it was first seen. Those of requests are of the run, until the first input.')
-    for rows, caption, head in (
-            (_scores(run, events), 'Detection response tasks (ISO 17488)', (
-                'task', 'driver', 'hits', 'misses', 'premature', 'unrequested', 'hit rate',
-                'response time, mean [s]', 'standard deviation [s]', 'median [s]')),
-            (_requests(run, events), 'Requests to take over', (
-                'task', 'vehicle', 'at [s]', 'seen after [ms]', 'seat taken after [s]',
-                'first input after [s]', 'outcome')),
-            (_span_rows(run, events), 'What lasted', ('task', 'driver', 'from [s]', 'for [s]'))):
-        told = list(rows)
-        if told:
-            html += table(caption, head, told, 'numbers')
+    html += filled_table('Detection response tasks (ISO 17488)', (
+        'task', 'driver', 'hits', 'misses', 'premature', 'unrequested', 'hit rate',
+        'response time, mean [s]', 'standard deviation [s]', 'median [s]'), (
+            (free(score.task), named(run, score.seat), str(score.hits), str(score.misses),
+             str(score.premature), str(score.unrequested), number(score.hit_rate),
+             number(score.response_mean_s), number(score.response_sd_s),
+             number(score.response_median_s))
+            for score in detection_scores(events)))
+    html += filled_table('Requests to take over', (
+        'task', 'vehicle', 'at [s]', 'seen after [ms]', 'seat taken after [s]',
+        'first input after [s]', 'outcome'), (
+            (free(event.name), named(run, event.seat), moment(run, event.onset_s),
+             number(event.times.delay_ms, 0), number(event.answered_s),
+             number(event.response_time_s), event.outcome)
+            for event in events if event.what == 'request'))
+    html += filled_table('What lasted', ('task', 'driver', 'from [s]', 'for [s]'), (
+        (free(event.name), named(run, event.seat), moment(run, event.onset_s),
+         number(event.duration_s, 1))
+        for event in events if event.what == 'span'))
     return Section('tasks', 'Tasks besides driving', html)
-
-
-def _scores(run: Run, events: Sequence[TaskEvent]) -> Iterator[Sequence[str]]:
-    for score in detection_scores(events):
-        yield (free(score.task), named(run, score.seat), str(score.hits), str(score.misses),
-               str(score.premature), str(score.unrequested), number(score.hit_rate),
-               number(score.response_mean_s), number(score.response_sd_s),
-               number(score.response_median_s))
-
-
-def _requests(run: Run, events: Sequence[TaskEvent]) -> Iterator[Sequence[str]]:
-    for event in events:
-        if event.what == 'request':
-            yield (free(event.name), named(run, event.seat), moment(run, event.onset_s),
-                   number(event.times.delay_ms, 0), number(event.answered_s),
-                   number(event.response_time_s), event.outcome)
-
-
-def _span_rows(run: Run, events: Sequence[TaskEvent]) -> Iterator[Sequence[str]]:
-    for event in events:
-        if event.what == 'span':
-            yield (free(event.name), named(run, event.seat), moment(run, event.onset_s),
-                   number(event.duration_s, 1))
 
 
 def motion_section(run: Run) -> Section:
@@ -223,11 +197,8 @@ def input_section(run: Run) -> Section | None:
     html = table('Inputs that the simulation consumed', (
         'vehicle', 'throttle on', 'brake on', 'hardest brake', 'in reverse', 'driven'), rows,
         'numbers') if rows else note('There was no input: planners drove all the time.')
-    if spans:
-        html += table('Reverse gear, and AVs driven by hand', (
-            'what', 'from [s]', 'to [s]'), [
-                (span.label, number(span.start_s), number(span.end_s)) for span in spans],
-            'numbers')
+    html += filled_table('Reverse gear, and AVs driven by hand', ('what', 'from [s]', 'to [s]'), (
+        (span.label, number(span.start_s), number(span.end_s)) for span in spans))
     plots = tuple(Plot(key, title, unit, tuple(
         vehicle_line(run, i, record.times_s, record.commands[:, i, COMMAND_COLUMNS.index(key)])
         for i, _ in vehicles),

@@ -15,6 +15,7 @@ from crgame_ros.analysis.criticality.thresholds import Thresholds
 from crgame_ros.analysis.pictures.critical_moments import TWICE
 from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import (
+    filled_table,
     free,
     marked,
     note,
@@ -88,12 +89,11 @@ def _rules(run: Run) -> str:
                 for name, each in RULE_MEASURES.items()))
             for vehicle in run.usual_rules], 'numbers')
     scheduler = run.log.game.scheduler
-    passed = [(named(run, vehicle.vehicle_id), each.kind, str(each.lanelet),
-               moment(run, (each.k - scheduler.k0) * scheduler.time_step_s), number(each.speed))
-              for vehicle in run.usual_rules for each in vehicle.passed]
-    return html if not passed else html + table(
-        'Lines passed at red, or at a stop sign without a halt', (
-            'vehicle', 'what', 'lanelet', 'at [s]', 'speed [m/s]'), passed, 'numbers')
+    return html + filled_table('Lines passed at red, or at a stop sign without a halt', (
+        'vehicle', 'what', 'lanelet', 'at [s]', 'speed [m/s]'), (
+            (named(run, vehicle.vehicle_id), each.kind, str(each.lanelet),
+             moment(run, (each.k - scheduler.k0) * scheduler.time_step_s), number(each.speed))
+            for vehicle in run.usual_rules for each in vehicle.passed))
 
 
 def _events(run: Run) -> str:
@@ -123,25 +123,26 @@ def criticality_section(run: Run) -> Section:
                 f'threshold: TTC below {limits.ttc_s:g} s, DRAC above {limits.drac:g} m/s², '
                 f'PET below {limits.pet_s:g} s.')
     for vehicle in measured:
-        rows = list(_worst(run, vehicle, limits))
         caption = f'Worst values of {named(run, vehicle.vehicle_id)}'
-        html += table(caption, ('measure', 'worst', 'unit', 'against', 'at [s]'), rows,
-                      'numbers worst') if rows else f'<p>{caption}: no other was near.</p>'
+        html += filled_table(caption, ('measure', 'worst', 'unit', 'against', 'at [s]'),
+                             _worst(run, vehicle, limits), 'numbers worst') \
+            or f'<p>{caption}: no other was near.</p>'
     told = [each.told(limits) for each in EXPOSURES.values()]
     html += table('Over the whole run', ('vehicle', *(
         f'{each.label} [{each.symbol}]' for each in told)), [
             (named(run, vehicle.vehicle_id), *map(number, vehicle.exposures.values()))
             for vehicle in measured], 'numbers')
-    following = [row for vehicle in measured for row in _headways(run, vehicle)]
-    if following:
-        html += table('Following a leader: gaps bumper to bumper, headways front to front', (
-            'vehicle', 'value', 'mean', 'median', 'unit',
-            *(f'below {limit} s' for limit in SHORT_S)), following, 'numbers')
-    crossings = [row for vehicle in measured for row in _crossings(run, vehicle, limits)]
-    if crossings:
-        html += table('Ways that crossed: post-encroachment time (PET)', (
-            'vehicle', 'first', 'second', 'second entered at [s]', 'PET [s]'), crossings,
-            'numbers')
+    html += filled_table('Following a leader: gaps bumper to bumper, headways front to front', (
+        'vehicle', 'value', 'mean', 'median', 'unit', *(f'below {limit} s' for limit in SHORT_S)),
+        (row for vehicle in measured for row in _headways(run, vehicle)))
+    ids = run.usual_criticality.ids
+    html += filled_table('Ways that crossed: post-encroachment time (PET)', (
+        'vehicle', 'first', 'second', 'second entered at [s]', 'PET [s]'), (
+            (named(run, vehicle.vehicle_id), named(run, ids[each.first]),
+             named(run, ids[each.second]), moment(run, each.entered_s),
+             marked(('≈ ' if each.is_estimate else '') + number(each.pet_s),
+                    limits.exceeded('pet', each.pet_s)))
+            for vehicle in measured for each in vehicle.crossings))
     return Section('criticality', 'Criticality', html, tuple(_plots(run, limits)))
 
 
@@ -164,16 +165,6 @@ def _headways(run: Run, vehicle: VehicleCriticality) -> Iterator[Sequence[str]]:
             shares = (share(part, 1.0) if unit == 's' else '' for part in each.below)
             yield (named(run, vehicle.vehicle_id), name.replace('_', ' '), number(each.mean),
                    number(each.median), unit, *shares)
-
-
-def _crossings(run: Run, vehicle: VehicleCriticality,
-               limits: Thresholds) -> Iterator[Sequence[str]]:
-    ids = run.usual_criticality.ids
-    for each in vehicle.crossings:
-        yield (named(run, vehicle.vehicle_id), named(run, ids[each.first]),
-               named(run, ids[each.second]), moment(run, each.entered_s),
-               marked(('≈ ' if each.is_estimate else '') + number(each.pet_s),
-                      limits.exceeded('pet', each.pet_s)))
 
 
 def _plots(run: Run, limits: Thresholds) -> Iterator[Plot]:

@@ -7,6 +7,7 @@ from datetime import datetime, UTC
 
 from crgame_ros.analysis.report.section import (
     colours_of,
+    filled_table,
     free,
     note,
     NOTHING,
@@ -26,13 +27,12 @@ _LONGEST_FILE = 20_000
 def run_section(run: Run) -> Section:
     """Return the section on the run itself."""
     game = run.log.game
-    html = table('The run', (), [(label, value) for label, value in _facts(run)], 'facts')
+    html = table('The run', (), _facts(run), 'facts')
     html += table('Who was driven', ('vehicle', 'driven by', 'type', 'length × width [m]',
                                      'planning problem', 'sees'), _vehicles(run), 'vehicles')
-    people = list(_people(run))
-    if people:
-        html += table('Drivers', ('vehicle', 'driver', 'took part as', 'device', 'browser',
-                                  'steps', 'input delay [ms]'), people, 'people')
+    html += filled_table('Drivers', (
+        'vehicle', 'driver', 'took part as', 'device', 'browser', 'steps', 'input delay [ms]'),
+        _people(run), 'people')
     notices = dict.fromkeys((*run.missing, *run.notices))
     if notices:
         items = ''.join(f'<li>{free(text)}</li>' for text in notices)

@@ -191,6 +191,13 @@ def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]],
             + f'<tbody>{body}</tbody></table></div>')
 
 
+def filled_table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]],
+                 kind: str = 'numbers') -> str:
+    """Return a table as `table` does; empty if there are no rows."""
+    known = list(rows)
+    return table(caption, head, known, kind) if known else ''
+
+
 def note(html: str) -> str:
     """Return a remark of lower emphasis as HTML."""
     return f'<p class="note">{html}</p>'
