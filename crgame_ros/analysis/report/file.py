@@ -142,7 +142,8 @@ def check_report_runs(count: int) -> None:
 def _comparison_section(runs: Sequence[Run]) -> Section:
     """Return the section that compares runs; letters identify them in plots."""
     head = ('', *(f'{letter(i)}: {free(run.name)}' for i, run in enumerate(runs)))
-    rows = [(words, *(cell(run) for run in runs)) for words, cell in _rows()]
+    columns = [_compared(run) for run in runs]
+    rows = [(words, *(column[words] for column in columns)) for words in columns[0]]
     return Section('comparison', 'Comparison', table(
         'The runs side by side; of measures the worst of all driven vehicles', head, rows,
         'numbers comparison') + planners_compared(runs, [letter(i) for i in range(len(runs))]),
@@ -155,28 +156,25 @@ def letter(place: int) -> str:
     return (letter(first - 1) if first else '') + chr(ord('A') + last)
 
 
-def _rows() -> Iterator[tuple[str, Callable[[Run], str]]]:
-    yield 'game', lambda run: free(title_of(run))
-    yield 'scenario', lambda run: free(run.log.game.benchmark_id)
-    yield 'drivers', lambda run: ', '.join(
-        f'{item.id} {free(item.driver)}' for item in run.log.game.humans) or NOTHING
-    yield 'planners', lambda run: ', '.join(
-        f'{item.id} {free(item.planner)}' for item in run.log.game.avs) or NOTHING
-    yield 'seed', lambda run: str(run.log.game.seed)
-    yield 'length [s]', lambda run: number(float(run.times_s[-1]), 1)
-    for name, measure in CHIEF.items():
-        yield measure.head, lambda run, name=name: _worst_of_all(run, name)  # type: ignore[misc]
-    yield 'time below the threshold of TTC [s]', lambda run: number(sum(
-        each.exposures['tet_s'] for each in run.usual_criticality.report()))
-    yield 'least PET [s]', _least_pet
-    yield 'contacts', lambda run: NOTHING if run.contacts is None else str(len(run.contacts))
-    yield 'violations', lambda run: NOTHING if run.outcome is None \
-        else str(run.outcome['drivability']['violations'])
-    yield 'events that took effect', lambda run: str(len(run.record.fired))
-    yield 'plans accepted', accepted
-    yield 'worst latency p99 [ms]', _latency
-    yield 'greatest cumulative error [ms]', lambda run: NOTHING \
-        if run.timing is None else number(run.timing['max_cumulative_error_ms'], 1)
+def _compared(run: Run) -> dict[str, str]:
+    """Return a run's cells in the comparison, by what they tell."""
+    game = run.log.game
+    return {
+        'game': free(title_of(run)), 'scenario': free(game.benchmark_id),
+        'drivers': ', '.join(f'{item.id} {free(item.driver)}' for item in game.humans) or NOTHING,
+        'planners': ', '.join(f'{item.id} {free(item.planner)}' for item in game.avs) or NOTHING,
+        'seed': str(game.seed), 'length [s]': number(float(run.times_s[-1]), 1),
+        **{measure.head: _worst_of_all(run, name) for name, measure in CHIEF.items()},
+        'time below the threshold of TTC [s]': number(sum(
+            each.exposures['tet_s'] for each in run.usual_criticality.report())),
+        'least PET [s]': _least_pet(run),
+        'contacts': NOTHING if run.contacts is None else str(len(run.contacts)),
+        'violations': NOTHING if run.outcome is None
+        else str(run.outcome['drivability']['violations']),
+        'events that took effect': str(len(run.record.fired)), 'plans accepted': accepted(run),
+        'worst latency p99 [ms]': _latency(run),
+        'greatest cumulative error [ms]': NOTHING if run.timing is None
+        else number(run.timing['max_cumulative_error_ms'], 1)}
 
 
 def _worst_of_all(run: Run, name: str) -> str:
@@ -214,18 +212,23 @@ def _latency(run: Run) -> str:
 
 
 def _plots(runs: Sequence[Run]) -> Iterator[Plot]:
-    yield _plot(runs, 'speed', 'Speed', 'm/s', lambda run, i: run.log.vehicle_states[
-        :, i, StateColumn.SPEED], None)
+    yield _plot(runs, 'speed', 'Speed', 'm/s', [
+        run.log.vehicle_states[..., StateColumn.SPEED].T for run in runs])
     for name, words, bounds in (('ttc', 'Time to collision', (0.0, 10.0)),
                                 ('min_distance', 'Distance', None)):
         yield _plot(runs, name.replace('_', '-'), words, MEASURES[name].symbol,
-                    lambda run, i, name=name: run.course[name][i], bounds)  # type: ignore[misc]
+                    [run.course[name] for run in runs], bounds)
 
 
 def _plot(runs: Sequence[Run], key: str, words: str, unit: str,
-          values: Callable[[Run, int], NDArray[np.float64]],
-          bounds: tuple[float, float] | None) -> Plot:
-    lines = [PlotLine(f'{letter(place)} {item.id}', run.times_s, values(run, i),
+          values: Sequence[NDArray[np.float64]],
+          bounds: tuple[float, float] | None = None) -> Plot:
+    """
+    Return a plot that compares the vehicles of runs.
+
+    :param values: (V, K) of each run.
+    """
+    lines = [PlotLine(f'{letter(place)} {vehicle}', run.times_s, values[place][i],
                       _COLOURS[place % len(_COLOURS)], _DASHES[i % len(_DASHES)])
-             for place, run in enumerate(runs) for i, item in enumerate(run.log.vehicles)]
+             for place, run in enumerate(runs) for i, vehicle in enumerate(run.vehicles)]
     return Plot(key, words, unit, tuple(lines[:_MOST_LINES]), bounds=bounds)
