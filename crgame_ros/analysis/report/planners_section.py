@@ -3,7 +3,7 @@
 """The sections on planners' scores and answers, and on a run's timing."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import (
@@ -47,13 +47,6 @@ _TABLE_I = (
 _RATIO = ('final', 'mean', 'min')
 
 
-class _Driver(NamedTuple):
-    """A column of scores: the vehicle, and the column's heading (HTML)."""
-
-    head: str
-    scores: VehicleScores
-
-
 def planners_section(run: Run) -> Section | None:
     """Return the section on the scores of planners and humans; None without planners."""
     if not run.log.game.avs:
@@ -62,11 +55,10 @@ def planners_section(run: Run) -> Section | None:
         return Section('planners', 'How planners drove', note(
             f'There are no scores: {free(run.usual_scores.refusal)}'))
     found = sorted(run.usual_scores.vehicles, key=lambda each: each.role == 'human')
-    drivers = [_Driver(_who(run, each), each) for each in found]
     html = note('Each score names its variant where the pointer rests on it. The nuPlan score is '
                 'the product of the lines with × times the weighted mean of those with +.'
-                + ('' if _is_whole(drivers) else _LEFT_OUT))
-    html += _table('How planners drove', drivers)
+                + ('' if any(each.commonroad is not None for each in found) else _LEFT_OUT))
+    html += _table('How planners drove', [(_who(run, each), each) for each in found])
     html += ''.join(note(text) for each in found for text in _remarks(run, each))
     return Section('planners', 'How planners drove', html)
 
@@ -77,7 +69,7 @@ def planners_compared(runs: Sequence[Run], letters: Sequence[str]) -> str:
 
     :param letters: letters that identify the runs.
     """
-    drivers = [_Driver(f'{letter}: {_who(run, each)}', each)
+    drivers = [(f'{letter}: {_who(run, each)}', each)
                for run, letter in zip(runs, letters, strict=True)
                for each in run.usual_scores.vehicles if each.role != 'human']
     return _table('How planners drove, the runs side by side', drivers,
@@ -89,17 +81,18 @@ def _who(run: Run, scores: VehicleScores) -> str:
     return f'{named(run, scores.vehicle_id)}{planner}'
 
 
-def _is_whole(drivers: Sequence[_Driver]) -> bool:
-    return any(each.scores.commonroad is not None for each in drivers)
+def _table(caption: str, drivers: Sequence[tuple[str, VehicleScores]],
+           kind: str = 'numbers') -> str:
+    """
+    Return the table of the scores of drivers.
+
+    :param drivers: each with the head of its column, HTML.
+    """
+    return table(caption, ('score', 'unit', *(head for head, _ in drivers)),
+                 _rows([scores.values() for _, scores in drivers]), kind)
 
 
-def _table(caption: str, drivers: Sequence[_Driver], kind: str = 'numbers') -> str:
-    return table(caption, ('score', 'unit', *(each.head for each in drivers)), _rows(drivers),
-                 kind)
-
-
-def _rows(drivers: Sequence[_Driver]) -> Iterator[Sequence[str]]:
-    values = [each.scores.values() for each in drivers]
+def _rows(values: Sequence[Mapping[str, float | None]]) -> Iterator[Sequence[str]]:
     for name, measure in SCORE_MEASURES.items():
         if all(each[name] is None for each in values):
             continue
