@@ -10,11 +10,17 @@ from pathlib import Path
 from typing import Literal, Self, TYPE_CHECKING
 
 from crgame_ros.errors import CrgameError
-from crgame_ros.game.documents import DrivenVehicle, GameDocument
+from crgame_ros.game.documents import GameDocument
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.instrument_streams import read_streams, RecordedStream
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.recorded_plans import PlanOutcome, plans_of_report, RunReport
+from crgame_ros.recording.recorded_plans import (
+    PlanOutcome,
+    plans_of_report,
+    read_plans,
+    RecordedPlan,
+    RunReport,
+)
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.run_folder import recording_in, run_name
 from crgame_ros.recording.run_record import record_of_log, run_record_of, RunRecord
@@ -33,7 +39,6 @@ if TYPE_CHECKING:  # They take a second to import, and only measures need them.
     from crgame_ros.analysis.pictures.timing_figure import TimedRun
     from crgame_ros.analysis.rules.vehicle_rules import VehicleRules
     from crgame_ros.analysis.scores.run_scores import RunScores
-    from crgame_ros.recording.recorded_plans import RecordedPlan
 
 FloatArray = NDArray[np.float64]
 # Called with a piece of work, as in `reading runs/NAME`, and the share done of it, 0 to 1.
@@ -79,11 +84,12 @@ class Run:
         """
         self.name, self.bag, self.key = name, bag, 'run1'
         self._epoch, self.scoring, self._progress = epoch, scoring, progress
-        self._known_log, self._known_record = log, record
         self._known_timing, self._result = timing, result
         self.tallies: dict[str, PlanTally] = {}
-        self._id: str | None = None
-        self._criticality: Criticality | None = None
+        if record is not None:
+            self.record, self.log = record, record.log
+        elif log is not None:
+            self.log = log
 
     @classmethod
     def of_recording(cls, path: Path, epoch: int | None = None, *, name: str = '',
@@ -106,18 +112,14 @@ class Run:
 
         :raises InputError: if the recording lacks it.
         """
-        if self._known_record is not None or self._result is not None:
+        if self._result is not None:
             return self.record.log
-        if self._known_log is not None:
-            return self._known_log
         assert self.bag is not None
         return read_trajectories(self.bag, self._epoch, self.telling('reading'))
 
     @cached_property
     def record(self) -> RunRecord:
         """Return the log, the drivers' commands and the events."""
-        if self._known_record is not None:
-            return self._known_record
         if self._result is not None:
             return run_record_of(self._result)
         assert self.bag is not None
@@ -128,14 +130,10 @@ class Run:
         """Return the game as it was run."""
         return self.log.game
 
-    @property
+    @cached_property
     def id(self) -> str:  # noqa: A003
-        """Return its id in tables: by default its name and epoch."""
-        return self._id or f'{self.name}:{self.game.epoch}'
-
-    @id.setter
-    def id(self, text: str) -> None:  # noqa: A003
-        self._id = text
+        """Return its id in tables: its name and epoch, unless it is set."""
+        return f'{self.name}:{self.game.epoch}'
 
     def as_part(self, key: str) -> Self:
         """Return the same run with another key: one of several in a report."""
@@ -156,12 +154,6 @@ class Run:
     def vehicles(self) -> tuple[str, ...]:
         """Return the ids of the driven vehicles: humans, then AVs."""
         return tuple(item.id for item in self.log.vehicles)
-
-    @property
-    def driven(self) -> tuple[DrivenVehicle, ...]:
-        """Return the game's driven vehicles, in the log's order."""
-        game = {item.id: item for item in self.game.vehicles}
-        return tuple(game[name] for name in self.vehicles)
 
     @property
     def duration_s(self) -> float:
@@ -260,13 +252,10 @@ class Run:
         return FrameScene(self.log, read_followed_plans(
             self.bag, self.log, self.telling('reading the plans of')))
 
-    @property
-    def plans(self) -> 'Callable[[], Iterator[RecordedPlan]] | None':
-        """Return a function that reads the recorded plans one by one; None if offline."""
-        if self.bag is None:
-            return None
-        from crgame_ros.recording.recorded_plans import read_plans
-        return partial(read_plans, self.bag, self.game.epoch, self.telling('reading the plans of'))
+    def plans(self) -> Iterator[RecordedPlan] | None:
+        """Read the recorded plans one by one; None of an offline run."""
+        return None if self.bag is None else read_plans(
+            self.bag, self.game.epoch, self.telling('reading the plans of'))
 
     def measure(self, on_tick: 'Callable[[Criticality], object]' = lambda _: None,
                 ) -> 'Criticality':
@@ -277,14 +266,14 @@ class Run:
         :raises InputError: if its scenario cannot be used.
         """
         from crgame_ros.analysis.criticality.recorded import measure_log
-        self._criticality = measure_log(
+        self.usual_criticality = measure_log(
             self.log, progress=self.telling('measuring'), on_tick=on_tick)
-        return self._criticality
+        return self.usual_criticality
 
-    @property
+    @cached_property
     def usual_criticality(self) -> 'Criticality':
         """Return how critical it was by the usual thresholds."""
-        return self._criticality or self.measure()
+        return self.measure()
 
     @cached_property
     def course(self) -> dict[str, FloatArray]:

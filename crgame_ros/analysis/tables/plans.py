@@ -72,9 +72,9 @@ def plan_rows(run: Run) -> Iterator[Row]:
     :raises InputError: if the recording is damaged.
     """
     avs = {av.id: av for av in run.game.avs}
-    plans = run.plans
-    run.tallies = {av: PlanTally() for av in avs} if plans is not None else {}
-    for plan in plans() if plans is not None else ():
+    plans = run.plans()
+    run.tallies = {} if plans is None else {av: PlanTally() for av in avs}
+    for plan in plans or ():
         yield {'run': run.id, **_row(run, plan, avs[plan.av], run.tallies[plan.av])}
 
 

@@ -98,7 +98,7 @@ VEHICLE_SCORES = TablePart((
 
 
 def _identity(run: Run) -> Iterator[Row]:
-    for item, driven in zip(run.log.vehicles, run.driven, strict=True):
+    for item, driven in zip(run.log.vehicles, run.game.vehicles, strict=True):
         yield {'run': run.id, 'id': item.id, 'role': item.role.value,
                'driver': driven.driver if isinstance(driven, DrivenHuman) else
                driven.planner if isinstance(driven, DrivenAv) else None,
