@@ -3,9 +3,7 @@
 """`crgame export`: runs as tables, with their data dictionary."""
 
 import argparse
-from functools import partial
 from pathlib import Path
-import sys
 
 from crgame_ros.errors import InputError
 
@@ -38,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def export(values: argparse.Namespace) -> int:
     """Write the tables of some runs, and print how many rows each has."""
     from crgame_ros.analysis.tables.run_tables import runs_in, write_tables
-    from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.progress import on_stderr, Progress
     from crgame_ros.recording.run_folder import recording_in
     out = values.out
     if out is None and len(values.runs) > 1:
@@ -47,8 +45,7 @@ def export(values: argparse.Namespace) -> int:
         if not run.exists():
             raise InputError('no such file or folder', str(run), 'give a run or its recording')
     out = out or recording_in(values.runs[0]).parent / 'tables'
-    progress = Progress(partial(print, file=sys.stderr, flush=True))
-    runs = runs_in(values.runs, values.epoch, progress.tell,
+    runs = runs_in(values.runs, values.epoch, Progress(on_stderr).tell,
                    'none' if values.no_scores else 'all')
     rows = write_tables(runs, out, values.to)
     width = max(map(len, rows))

@@ -3,8 +3,7 @@
 """`crgame figures`: draw the figures of a paper from recorded runs."""
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 import math
 from pathlib import Path
 import re
@@ -69,15 +68,14 @@ def figures(values: argparse.Namespace) -> int:
     """Draw the requested figures, and print the files with their contents."""
     from crgame_ros.analysis.pictures.figure_style import FORMATS
     from crgame_ros.analysis.runs.run import Run
-    from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.progress import on_stderr, Progress
     from crgame_ros.recording.run_folder import recording_in
     wanted = _listed('--figures', values.figures, FIGURES) if values.figures is not None \
         else (() if values.video else FIGURES)
     formats = _listed('--format', values.format, FORMATS)
     times_s = None if values.at is None else _times(values.at)
     _check(values)
-    say = partial(print, file=sys.stderr, flush=True)
-    runs = [Run.of_recording(path, values.epoch, name=label, progress=Progress(say).tell)
+    runs = [Run.of_recording(path, values.epoch, name=label, progress=Progress(on_stderr).tell)
             for path, label in zip(
                 values.runs, values.label or [''] * len(values.runs), strict=True)]
     for run, path in zip(runs, values.runs, strict=True):
@@ -95,10 +93,9 @@ def figures(values: argparse.Namespace) -> int:
             _write(_profiles(run, values), own / 'profiles', formats, 'heading angle, position '
                    f'and velocity{" and more" if values.more else ""} of {run.name}')
     if 'timing' in wanted or 'table' in wanted:
-        _timing(runs, folder, wanted, formats, values.columns,
-                say if values.figures is None else None)
+        _timing(runs, folder, wanted, formats, values.columns, values.figures is not None)
     if values.video:
-        _video(runs[0], values.video, say)
+        _video(runs[0], values.video)
     return 0
 
 
@@ -177,11 +174,11 @@ def _profiles(run: 'Run', values: argparse.Namespace) -> 'Figure':
 
 
 def _timing(runs: Sequence['Run'], folder: Path, wanted: Sequence[str],
-            formats: Sequence[str], columns: int, say: Callable[[str], object] | None) -> None:
+            formats: Sequence[str], columns: int, is_required: bool) -> None:
     """
     Draw the timing and write the table of all runs.
 
-    :param say: called with a note where a run has no cycles; None where that is an error.
+    :param is_required: whether it is an error, not a note, that a run has no cycles.
     """
     from crgame_ros.analysis.pictures.timing_figure import timing_figure
     from crgame_ros.analysis.pictures.timing_table import TimingTable
@@ -190,9 +187,9 @@ def _timing(runs: Sequence['Run'], folder: Path, wanted: Sequence[str],
     try:
         timed = [run.timed for run in runs]
     except InputError as error:
-        if say is None:
+        if is_required:
             raise
-        say(f'note: no timing: {error}')
+        print(f'note: no timing: {error}', file=sys.stderr)
         return
     names = ' and '.join(run.name for run in runs)
     if 'timing' in wanted:
@@ -218,14 +215,14 @@ def _write(figure: 'Figure', place: Path, formats: Sequence[str], caption: str) 
         print(f'{path}: {caption}', flush=True)
 
 
-def _video(run: 'Run', path: Path, say: Callable[[str], object]) -> None:
+def _video(run: 'Run', path: Path) -> None:
     from crgame_ros.analysis.pictures.run_video import video_path, write_video
     from crgame_ros.recording.export import prepare_folder
-    from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.progress import on_stderr, Progress
     prepare_folder(path.absolute().parent)
     if video_path(path) != path:
-        say('note: ffmpeg is not installed: the video becomes a GIF')
-    written = write_video(run.scene, path, Progress(say, f'drawing {run.name}'))
+        on_stderr('note: ffmpeg is not installed: the video becomes a GIF')
+    written = write_video(run.scene, path, Progress(on_stderr, f'drawing {run.name}'))
     print(f'{written}: {run.name} in real time')
 
 

@@ -4,10 +4,8 @@
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 import json
 from pathlib import Path
-import sys
 from typing import Any, TYPE_CHECKING
 
 from crgame_ros.analysis.criticality.thresholds import OPTIONS, Thresholds, USUAL
@@ -52,17 +50,18 @@ def measure(values: argparse.Namespace) -> int:
     """Measure a run, and print the results."""
     from crgame_ros.analysis.behaviour.driver import behaviour_lines, detection_lines
     from crgame_ros.analysis.run_measures import check_requests, measure_run
-    from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.progress import on_stderr, Progress
     from crgame_ros.recording.run_folder import recording_in
     from crgame_ros.recording.run_record import read_run_record
     thresholds = Thresholds(*(getattr(values, field) for field in OPTIONS))
     thresholds.check('--')
     path = values.run
-    say = partial(print, file=sys.stderr, flush=True)
-    record = read_run_record(recording_in(path), values.epoch, Progress(say, f'reading {path}'))
+    record = read_run_record(recording_in(path), values.epoch,
+                             Progress(on_stderr, f'reading {path}'))
     check_requests(record, values.request, '--request')
-    found = measure_run(record, thresholds, values.request, Progress(say, f'measuring {path}'),
-                        Progress(say, f'measuring the drivers of {path}'))
+    found = measure_run(record, thresholds, values.request,
+                        Progress(on_stderr, f'measuring {path}'),
+                        Progress(on_stderr, f'measuring the drivers of {path}'))
     if values.json:
         print(json.dumps(found.as_dict(), indent=2, allow_nan=False))
     else:

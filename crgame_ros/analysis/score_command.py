@@ -5,7 +5,6 @@
 import argparse
 from collections.abc import Iterator
 from datetime import datetime
-from functools import partial
 import json
 from pathlib import Path
 import sys
@@ -77,8 +76,8 @@ def score(values: argparse.Namespace) -> int:
 
 
 def _progress(what: str) -> 'Progress':
-    from crgame_ros.recording.progress import Progress
-    return Progress(partial(print, file=sys.stderr, flush=True), what)
+    from crgame_ros.recording.progress import on_stderr, Progress
+    return Progress(on_stderr, what)
 
 
 def _score_run(values: argparse.Namespace) -> 'list[PlannerScores]':

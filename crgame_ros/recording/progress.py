@@ -3,10 +3,16 @@
 """Progress messages of long work."""
 
 from collections.abc import Callable
+import sys
 import time
 
 # Shorter work prints no messages [s].
 PERIOD_S = 2.0
+
+
+def on_stderr(line: str) -> None:
+    """Print a line for people at once, apart from the results of a command."""
+    print(line, file=sys.stderr, flush=True)
 
 
 class Progress:

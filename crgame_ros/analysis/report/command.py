@@ -3,9 +3,7 @@
 """`crgame report`: write one HTML file on a run, or on several side by side."""
 
 import argparse
-from functools import partial
 from pathlib import Path
-import sys
 
 REPORT_FILE = 'report.html'
 DESCRIPTION = """\
@@ -38,12 +36,11 @@ def report(values: argparse.Namespace) -> int:
         write_report,
     )
     from crgame_ros.analysis.runs.run import Run
-    from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.progress import on_stderr, Progress
     check_report_runs(len(values.runs))
     out = values.out or _place(values.runs[0])
     check_report_path(out)
-    say = partial(print, file=sys.stderr, flush=True)
-    write_report([Run.of_recording(path, values.epoch, progress=Progress(say).tell)
+    write_report([Run.of_recording(path, values.epoch, progress=Progress(on_stderr).tell)
                   for path in values.runs], out)
     print(out)
     return 0
