@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A frame of the scene on axes of matplotlib."""
 
-from typing import NamedTuple
-
 from crgame_ros.analysis.pictures.figure_style import (
     DIVIDER_COLOUR,
     EDGE_COLOUR,
@@ -13,7 +11,7 @@ from crgame_ros.analysis.pictures.figure_style import (
     shade,
     tint,
 )
-from crgame_ros.analysis.pictures.scene_frame import SceneFrame
+from crgame_ros.analysis.pictures.scene_frame import FrameBody, SceneFrame
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import PathPatch, Polygon
@@ -32,26 +30,14 @@ _GAP, _STEP, _ATTEMPTS = 0.35, 0.6, 4
 _DIRECTIONS = np.array(((0, 1), (0, -1), (-1, 0), (1, 0), (1, 1), (-1, 1), (-1, -1), (1, -1)))
 
 
-class PlacedName(NamedTuple):
-    """
-    A name with its middle in the window's coordinates [m].
-
-    :param colour: colour of the vehicle, as #rrggbb.
-    """
-
-    text: str
-    x: float
-    y: float
-    colour: str
-
-
 def place_names(frame: SceneFrame, text_height: float,
-                taken: tuple[float, float] = (0.0, 0.0)) -> tuple[PlacedName, ...]:
+                taken: tuple[float, float]) -> list[tuple[FrameBody, float, float]]:
     """
     Find places for the names of the labelled vehicles.
 
     :param text_height: [m]
     :param taken: length and height of the text in the upper left corner [m]
+    :return: each vehicle with the middle of its name in the window's coordinates [m].
     """
     half = 0.5 * np.array((frame.window.length, frame.window.height))
     corner = np.array((-half[0], half[1] - taken[1], -half[0] + taken[0], half[1]))
@@ -76,8 +62,8 @@ def place_names(frame: SceneFrame, text_height: float,
                 + 0.02 * _counts(tried, ways) + 0.1 * attempts)
         best = middles[int(np.argmin(cost))]
         boxes.append(np.concatenate((best - 0.5 * size, best + 0.5 * size)))
-        names.append(PlacedName(body.id, float(best[0]), float(best[1]), body.colour))
-    return tuple(names)
+        names.append((body, float(best[0]), float(best[1])))
+    return names
 
 
 def _overlaps(tried: FloatArray, others: FloatArray) -> FloatArray:
@@ -137,10 +123,9 @@ def draw_frame(axes: Axes, frame: SceneFrame, metre: float, corner: str = '') ->
     halo = [withStroke(linewidth=1.6, foreground='white')]
     taken = (CORNER_SIZE * (CHARACTER_WIDTH * len(corner) + 1.0) / metre,
              1.5 * CORNER_SIZE / metre) if corner else (0.0, 0.0)
-    for name in place_names(frame, NAME_SIZE / metre, taken):
-        axes.text(name.x, name.y, name.text, color=shade(name.colour), fontsize=NAME_SIZE,
-                  ha='center', va='center_baseline', zorder=7, path_effects=halo,
-                  gid=f'name {name.text}')
+    for body, x, y in place_names(frame, NAME_SIZE / metre, taken):
+        axes.text(x, y, body.id, color=shade(body.colour), fontsize=NAME_SIZE, ha='center',
+                  va='center_baseline', zorder=7, path_effects=halo, gid=f'name {body.id}')
     if corner:
         axes.annotate(corner, (0.0, 1.0), (1.7, -1.7), xycoords='axes fraction',
                       textcoords='offset points', ha='left', va='top', fontsize=CORNER_SIZE,

@@ -56,10 +56,10 @@ def frame_svg(frame: SceneFrame, width: int = 480) -> str:
         if body.front is not None:
             paper.fill(((body.front,),), '#fff')
     corner = f'{frame.time_s:.2f} s'
-    for name in place_names(frame, NAME_SIZE / scale, (0.6 * TIME_SIZE * len(corner) / scale,
-                                                       1.5 * TIME_SIZE / scale)):
-        x, y = paper.place(name.x, name.y)
-        paper.write(name.text, x, y + 0.35 * NAME_SIZE, NAME_SIZE, shade(name.colour), 'middle')
+    taken = 0.6 * TIME_SIZE * len(corner) / scale, 1.5 * TIME_SIZE / scale
+    for body, x, y in place_names(frame, NAME_SIZE / scale, taken):
+        left, top = paper.place(x, y)
+        paper.write(body.id, left, top + 0.35 * NAME_SIZE, NAME_SIZE, shade(body.colour), 'middle')
     paper.write(corner, 5.0, 1.2 * TIME_SIZE, TIME_SIZE, INK, 'start')
     return paper.text()
 
