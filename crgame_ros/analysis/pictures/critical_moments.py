@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Sequence
 import math
 from typing import NamedTuple
 
-from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
+from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES, Worst
 from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.simulation.contacts import ContactEntry
 
@@ -80,17 +80,14 @@ def _critical(criticality: Criticality) -> Iterator[_Ranked]:
     limits = criticality.thresholds
     for vehicle in criticality.report():
         for name in ('ttc', 'drac'):
-            worst, measure = vehicle.worst.get(name), MEASURES[name]
-            value = 0.0 if worst is None else worst.value
-            if worst is None or value == 0.0 or math.isinf(value):
+            worst = vehicle.worst.get(name)
+            if worst is None or worst.value == 0.0 or math.isinf(worst.value):
                 # They touch.
                 continue
-            excess = limits.excess(name, value)
-            if excess > 1.0 or name == 'ttc' and value < NOTICED_S:
-                yield _Ranked(_CRITICAL if excess > 1.0 else _NOTICED, -excess, Moment(
-                    worst.time_s,
-                    f'{measure.label} of {vehicle.vehicle_id} to {worst.other} is {value:.2f} '
-                    f'{measure.symbol}', (vehicle.vehicle_id, worst.other)))
+            excess = limits.excess(name, worst.value)
+            if excess > 1.0 or name == 'ttc' and worst.value < NOTICED_S:
+                yield _Ranked(_CRITICAL if excess > 1.0 else _NOTICED, -excess,
+                              _worst(vehicle.vehicle_id, name, worst))
         for crossing in vehicle.crossings:
             if limits.exceeded('pet', crossing.pet_s):
                 first, second = (criticality.ids[i] for i in (crossing.first, crossing.second))
@@ -98,6 +95,13 @@ def _critical(criticality: Criticality) -> Iterator[_Ranked]:
                     crossing.entered_s,
                     f'{second} enters {crossing.pet_s:.2f} s after {first} has left (PET)',
                     tuple(sorted((first, second), key=lambda each: each != vehicle.vehicle_id))))
+
+
+def _worst(vehicle_id: str, name: str, worst: Worst) -> Moment:
+    """Return the moment of a vehicle's worst value of a measure."""
+    measure = MEASURES[name]
+    return Moment(worst.time_s, f'{measure.label} of {vehicle_id} to {worst.other} is '
+                  f'{worst.value:.2f} {measure.symbol}', (vehicle_id, worst.other))
 
 
 def _close(criticality: Criticality, start_s: float) -> Iterator[_Ranked]:
@@ -142,20 +146,20 @@ def story_moments(record: RunRecord, criticality: Criticality,
     """
     first_s, last_s = record.log.times_s[[0, -1]].tolist()
     ends = [Moment(first_s, 'start', ()), Moment(last_s, 'end', ())]
-    found = list(critical)
-    found += [Moment(worst.time_s, f'{MEASURES[name].label} of {vehicle.vehicle_id} to '
-                     f'{worst.other} is {worst.value:.2f} {MEASURES[name].symbol}',
-                     (vehicle.vehicle_id, worst.other))
-              for vehicle in criticality.report() for name, worst in vehicle.worst.items()
-              if name != TWICE and MEASURES[name].matters(worst.value)]
+    found = [*critical, *(
+        _worst(vehicle.vehicle_id, name, worst)
+        for vehicle in criticality.report() for name, worst in vehicle.worst.items()
+        if name != TWICE and MEASURES[name].matters(worst.value))]
     chosen: list[Moment] = []
     for each in found:
-        if all(abs(each.time_s - other.time_s) > TOGETHER_S for other in chosen) \
-                and len(chosen) + len(ends) < MOST_FRAMES:
+        if len(chosen) + len(ends) < MOST_FRAMES and _is_apart(each, chosen):
             chosen.append(each)
-    chosen += [end for end in ends
-               if all(abs(end.time_s - other.time_s) > TOGETHER_S for other in chosen)]
+    chosen += [end for end in ends if _is_apart(end, chosen)]
     return tuple(sorted(chosen))
+
+
+def _is_apart(moment: Moment, others: Sequence[Moment]) -> bool:
+    return all(abs(moment.time_s - other.time_s) > TOGETHER_S for other in others)
 
 
 def nearest_moment(moments: Sequence[Moment], time_s: float) -> int | None:

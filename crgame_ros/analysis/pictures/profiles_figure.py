@@ -93,7 +93,11 @@ def draw_over_time(axes: Axes, record: RunRecord, styles: dict[str, VehicleStyle
     axes.set_ylabel(label)
     axes.set_xlim(times_s[0], times_s[-1])
     # The least range of the axis hides rounding noise.
-    least = 0.1 if column is StateColumn.YAW else 0.02
+    _widen(axes, 0.1 if column is StateColumn.YAW else 0.02)
+
+
+def _widen(axes: Axes, least: float) -> None:
+    """Widen the range of the vertical axis, if it is below the least one."""
     low, high = axes.get_ylim()
     if high - low < least:
         middle = 0.5 * (low + high)
@@ -114,10 +118,7 @@ def _draw_positions(axes: Axes, record: RunRecord, styles: dict[str, VehicleStyl
         axes.margins(0.08)
         axes.set_aspect('equal', adjustable='datalim')
     else:
-        low, high = axes.get_ylim()
-        if high - low < 4.0:
-            middle = 0.5 * (low + high)
-            axes.set_ylim(middle - 2.0, middle + 2.0)
+        _widen(axes, 4.0)
     axes.xaxis.set_major_locator(MaxNLocator(4))
 
 
