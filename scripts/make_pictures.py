@@ -78,7 +78,7 @@ def _overview(record: RunRecord, times_s: Sequence[float]) -> Figure:
     """
     scene = FrameScene(record.log)
     ks = [scene.k_at(time_s) for time_s in times_s]
-    windows = scene.windows([scene.row(k) for k in ks], standing=False, least=LEAST_ROAD)
+    windows = scene.windows([scene.row(k) for k in ks], follows=True, least=LEAST_ROAD)
     width = WIDTHS[2]
     metre = width / windows[0].length
     height = windows[0].height * metre

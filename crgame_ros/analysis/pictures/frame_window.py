@@ -78,12 +78,10 @@ def all_poses(log: RunTrajectories, rows: Sequence[int]) -> FloatArray:
     return np.concatenate((log.vehicle_states[chosen, :, :3], log.object_poses[chosen]), axis=1)
 
 
-def series_windows(log: RunTrajectories, rows: Sequence[int], vehicles: Sequence[str] = (), *,
-                   standing: bool | None = None, reach: float = REACH,
-                   least: float = LEAST_LENGTH,
-                   road: Callable[[FrameWindow], tuple[float, float]] | None = None,
-                   heading: Callable[[float, float, float], float] | None = None
-                   ) -> tuple[FrameWindow, ...]:
+def series_windows(log: RunTrajectories, rows: Sequence[int], vehicles: Sequence[str],
+                   road: Callable[[FrameWindow], tuple[float, float]],
+                   heading: Callable[[float, float, float], float], *, follows: bool,
+                   reach: float, least: float) -> tuple[FrameWindow, ...]:
     """
     Return the windows of one figure's frames, which show the driven and the named vehicles.
 
@@ -91,13 +89,13 @@ def series_windows(log: RunTrajectories, rows: Sequence[int], vehicles: Sequence
 
     :param rows: rows of the log, one for each frame.
     :param vehicles: ids; the first driven one is in focus, without one the first AV or human.
-    :param standing: whether all show the same piece of road; None to decide by its length.
-    :param reach: vehicles farther from the one in focus need not be shown [m]
-    :param least: least length of a window [m]
     :param road: returns the range of the road across a window [m]; if the window is higher than
         needed, it is centred on the road rather than on the vehicles.
-    :param heading: returns the road's heading [rad] at x, y and yaw of a vehicle; None to align
-        windows with the vehicle in focus.
+    :param heading: returns the road's heading [rad] at x, y and yaw of a vehicle.
+    :param follows: whether the camera follows the vehicle in focus even where all frames can show
+        the same piece of road.
+    :param reach: vehicles farther from the one in focus need not be shown [m]
+    :param least: least length of a window [m]
     :return: windows of one size.
     :raises InputError: if the run has no driven vehicle.
     """
@@ -108,10 +106,9 @@ def series_windows(log: RunTrajectories, rows: Sequence[int], vehicles: Sequence
     corners = footprints([log.descriptions[i] for i in wanted], poses[:, wanted])
     near = np.hypot(*np.moveaxis(poses[:, wanted, :2] - poses[:, focus, None, :2], -1, 0)) <= reach
     own = poses[:, focus].copy()
-    if heading is not None:
-        own[:, 2] = [heading(*place) for place in own.tolist()]
+    own[:, 2] = [heading(*place) for place in own.tolist()]
     middle = np.broadcast_to(own[len(rows) // 2], (len(rows), 3))
-    for centers in (middle, own) if standing is None else (middle if standing else own,):
+    for centers in (own,) if follows else (middle, own):
         seen = np.concatenate([
             ((each[row] - centers[row, :2]) @ _turn(centers[row, 2]))
             for i, each in enumerate(corners) for row in range(len(rows)) if near[row, i]])
@@ -124,10 +121,9 @@ def series_windows(log: RunTrajectories, rows: Sequence[int], vehicles: Sequence
     def shown(center: FloatArray, height: float) -> FrameWindow:
         x, y = (center[:2] + _turn(center[2]) @ offset).tolist()
         return FrameWindow(x, y, float(center[2]), length, height)
-    if road is not None:
-        spare = max(0.0, 0.5 * height - 0.5 * float(high[1] - low[1]) - LEAST_BESIDE)
-        right, left = road(shown(centers[len(rows) // 2], 2.0 * height))
-        offset = offset + (0.0, np.clip(0.5 * (right + left), -spare, spare))
+    spare = max(0.0, 0.5 * height - 0.5 * float(high[1] - low[1]) - LEAST_BESIDE)
+    right, left = road(shown(centers[len(rows) // 2], 2.0 * height))
+    offset = offset + (0.0, np.clip(0.5 * (right + left), -spare, spare))
     return tuple(shown(center, height) for center in centers)
 
 

@@ -48,7 +48,7 @@ def write_video(scene: FrameScene, path: Path,
     stride = max(1, math.ceil(1.0 / (MOST_RATE * step_s) - 1e-9))
     rows = range(0, len(scene.log.ks), stride)
     figure, windows = _prepared(path.suffix, scene.windows(
-        rows, standing=False, reach=VIDEO_REACH))
+        rows, follows=True, reach=VIDEO_REACH))
     writer = _writer(path.suffix, 1.0 / (stride * step_s))
     try:
         with paper_style(), whole_file(path, f'.part{path.suffix}') as part, \

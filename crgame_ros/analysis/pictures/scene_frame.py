@@ -288,12 +288,11 @@ class FrameScene:
                           traces, plans)
 
     def windows(self, rows: Sequence[int], vehicles: Sequence[str] = (), *,
-                standing: bool | None = None, reach: float = REACH,
+                follows: bool = False, reach: float = REACH,
                 least: float = LEAST_LENGTH) -> tuple[FrameWindow, ...]:
-        """Return windows as `series_windows` does, fitted to the available road."""
-        return series_windows(self.log, rows, vehicles, standing=standing, reach=reach,
-                              least=least, road=self.road.across,
-                              heading=self._road_heading)
+        """Return windows as `series_windows` does, along the run's road."""
+        return series_windows(self.log, rows, vehicles, self.road.across, self._road_heading,
+                              follows=follows, reach=reach, least=least)
 
     def _road_heading(self, x: float, y: float, yaw: float) -> float:
         """Return the heading of the lane of a vehicle, as it drives along it; off the road yaw."""

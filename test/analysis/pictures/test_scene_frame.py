@@ -6,7 +6,7 @@ from dataclasses import replace
 from xml.etree import ElementTree
 
 from crgame_ros.analysis.pictures.frame_svg import frame_svg
-from crgame_ros.analysis.pictures.frame_window import FrameWindow, series_windows
+from crgame_ros.analysis.pictures.frame_window import FrameWindow
 from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps
 from crgame_ros.analysis.pictures.scene_frame import FollowedPlan, FrameScene
 from crgame_ros.errors import InputError
@@ -130,9 +130,10 @@ def test_the_road_is_cut_to_the_window(cut_in_scene: FrameScene) -> None:
 
 def test_a_camera_goes_along_where_one_stretch_is_too_long(cut_in: RunRecord) -> None:
     """It stands over 0.4 s and follows the AV over 8 s; both sizes are the same in a figure."""
-    near = series_windows(cut_in.log, [20, 22, 24])
+    scene = FrameScene(cut_in.log)
+    near = scene.windows([20, 22, 24])
     assert len(set(near)) == 1
-    far = series_windows(cut_in.log, [0, 40, 80])
+    far = scene.windows([0, 40, 80])
     assert len(set(far)) == 3
     states = cut_in.log.vehicle_states[[0, 40, 80], 1]
     away = [window.to_window(state[None, :2])[0]
@@ -144,7 +145,7 @@ def test_a_window_lies_along_the_road(cut_in_scene: FrameScene) -> None:
     """Not along the vehicle in focus, which turns while it changes the lane."""
     log = cut_in_scene.log
     yaws = log.vehicle_states[:, 0, 2]
-    windows = cut_in_scene.windows(range(len(log.ks)), [log.vehicles[0].id], standing=False)
+    windows = cut_in_scene.windows(range(len(log.ks)), [log.vehicles[0].id], follows=True)
     assert np.ptp(yaws) > 0.02
     assert np.ptp([window.yaw for window in windows]) < 1e-3
     assert windows[0].yaw == pytest.approx(float(yaws[0]), abs=0.02)
