@@ -93,11 +93,6 @@ class Plot:
     bounds: tuple[float, float] | None = None
     plane: bool = False
 
-    @property
-    def points(self) -> int:
-        """Return the number of points of its lines."""
-        return sum(len(line.xs) for line in self.lines)
-
 
 @dataclass(frozen=True)
 class Section:

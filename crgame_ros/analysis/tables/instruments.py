@@ -90,8 +90,7 @@ GAZE = TableDeclaration(
     (*_OF,
      Column('number', INTEGER, '1', 'number of the sample in instrument_samples'),
      Column('time_s', NUMBER, 's', "when it was, on the run's clock",
-            variant='as in instrument_samples', empty='LSL has not measured the clock of its '
-            'sender'),
+            variant='as in instrument_samples', empty=_UNMEASURED),
      Column('x', NUMBER, '1', "from the left edge of the 3D view, in shares of the view's width",
             empty=_NO_PLACE),
      Column('y', NUMBER, '1', "from the upper edge, in shares of the view's height",
