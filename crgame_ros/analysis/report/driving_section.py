@@ -224,8 +224,6 @@ def stretches(holds: NDArray[np.bool_], times_s: FloatArray) -> list[tuple[float
 
 def _summary(commands: FloatArray, times_s: FloatArray) -> tuple[str, ...]:
     known = commands[np.isfinite(commands[:, 0])]
-    if not len(known):
-        return (NOTHING,) * 5
     parts = [f'{100.0 * float((known[:, place] > least).mean()):.0f} %'
              for place, least in ((0, 0.01), (1, 0.01), (_REVERSE, 0.5))]
     return (parts[0], parts[1], number(float(known[:, 1].max())), parts[2],

@@ -74,8 +74,7 @@ def _violations(run: Run) -> str:
     if not found:
         return note('No vehicle left the road or broke a rule that was checked.')
     return table('Violations, when each began', ('vehicle', 'what', 'at [s]'), [
-        (named(run, item['vehicle']), free(item['what']),
-         NOTHING if item['n'] is None else moment(run, _time_s(run, item['n'])))
+        (named(run, item['vehicle']), free(item['what']), moment(run, _time_s(run, item['n'])))
         for item in found], 'numbers')
 
 

@@ -208,13 +208,10 @@ def plan_section(run: Run) -> Section | None:
 
 
 def _counts(found: PlanOutcome) -> Sequence[str]:
-    return (_count(found.requests), _count(found.accepted), share(found.accepted, found.requests),
-            *map(_count, (found.refused, found.timed_out, found.skipped, found.fallback,
-                          found.steps_without_plan)))
-
-
-def _count(value: int | None) -> str:
-    return NOTHING if value is None else str(value)
+    return (number(found.requests, 0), number(found.accepted, 0),
+            share(found.accepted, found.requests),
+            *(number(count, 0) for count in (found.refused, found.timed_out, found.skipped,
+                                             found.fallback, found.steps_without_plan)))
 
 
 def _times(found: PlanOutcome) -> Sequence[str]:

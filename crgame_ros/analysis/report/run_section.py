@@ -153,15 +153,15 @@ def _people(run: Run) -> Iterator[tuple[str, ...]]:
     last_n = int(run.log.ks[-1] - scheduler.k0) * scheduler.steps_per_tick
     for spell, delay_ms, _ in run.record.drivers:
         person = spell.person
+        if person is not None:
+            who = tuple(free(text or NOTHING) for text in (
+                person.name, person.role, person.device, person.browser))
+        elif delay_ms is not None:
+            who = NOTHING, 'driver', free(spell.driver), 'at the machine'
+        else:
+            continue
         until_n = last_n if spell.until_n is None else spell.until_n
-        if person is None and delay_ms is not None:
-            yield (named(run, spell.seat), NOTHING, 'driver', free(spell.driver), 'at the machine',
-                   f'{spell.from_n} to {until_n}', number(delay_ms, 0))
-        elif person is not None:
-            yield (named(run, spell.seat), free(person.name or NOTHING),
-                   free(person.role or NOTHING), free(person.device or NOTHING),
-                   free(person.browser or NOTHING), f'{spell.from_n} to {until_n}',
-                   NOTHING if delay_ms is None else number(delay_ms, 0))
+        yield (named(run, spell.seat), *who, f'{spell.from_n} to {until_n}', number(delay_ms, 0))
 
 
 def named(run: Run, vehicle: str) -> str:
