@@ -175,7 +175,7 @@ def read_trajectories(path: Path, epoch: int | None = None,
 
 
 def _commands(table: CycleTable, vehicles: Sequence[str], ticks: IntArray) -> FloatArray:
-    """Return the commands (K, V, 5) of the steps that led to the ticks n; NaN where unknown."""
+    """Return the commands (K, V, 6) of the steps that led to the ticks n; NaN where unknown."""
     ns = table.column('n').astype(np.int64)
     places = np.minimum(np.searchsorted(ns, ticks), len(ns) - 1)
     found = table.commands_of(vehicles)[places]

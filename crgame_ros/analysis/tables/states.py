@@ -151,7 +151,7 @@ class _StateRows:
         return found | self._lanes(poses, here)
 
     def _commands(self, part: slice, everybody: int) -> FloatArray:
-        """Return the commands that led to each state (steps, all, 5); NaN without a command."""
+        """Return the commands that led to each state (steps, all, 6); NaN without a command."""
         log, record = self._run.log, self._run.record
         found = np.full((part.stop - part.start, everybody, len(COMMAND_COLUMNS)), np.nan)
         wanted = self._run.steps_of(log.ks[part])
@@ -185,7 +185,7 @@ class _StateRows:
 
 
 def _consumed(commands: FloatArray) -> Mapping[str, object]:
-    """Return the columns of the commands consumed (R, 5)."""
+    """Return the columns of the commands consumed (R, 6)."""
     # Putting a vehicle back is an event (`events`).
     found = {name: column for name, column in zip(
         COMMAND_COLUMNS, commands.T, strict=True) if name != 'put_back'}
