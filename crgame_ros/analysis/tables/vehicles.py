@@ -35,15 +35,16 @@ NEVER_NEAR = 'it was never defined: no other was near'
 # A shorter time to collision counts as this one in 1 / ttc, which is infinite in a contact [s].
 LEAST_TTC_S = 0.1
 HUMAN, UNRECORDED = 'a human drives it', 'not an AV, or not recorded'
-# Keys of `timing.json`, with the meaning of each count.
+# By column: the key of `timing.json`, and the meaning of the count.
 COUNTS = {
-    'requests': 'plan requests', 'accepted': 'plans that were accepted',
-    'refused': 'plans that were refused',
-    'of_others': 'answers of other programs than its planner',
-    'skipped': 'requests left out while one was open',
-    'timed_out': 'requests that were not answered in time',
-    'realigned': 'plans that were aligned to where the AV was',
-    'steps_without_plan': 'simulation steps without a plan to follow'}
+    'requests': ('requests', 'plan requests'),
+    'plans_accepted': ('accepted', 'plans that were accepted'),
+    'plans_refused': ('refused', 'plans that were refused'),
+    'plans_of_others': ('of_others', 'answers of other programs than its planner'),
+    'skipped': ('skipped', 'requests left out while one was open'),
+    'timed_out': ('timed_out', 'requests that were not answered in time'),
+    'plans_realigned': ('realigned', 'plans that were aligned to where the AV was'),
+    'steps_without_plan': ('steps_without_plan', 'simulation steps without a plan to follow')}
 NOT_SCORED = 'the run was not scored'
 
 
@@ -167,30 +168,12 @@ def _following_columns() -> Iterator[Column]:
                          f' divided by its speed, below {limit} s', FOOTPRINTS, moving, NO_LEADER)
 
 
-def _worst_columns() -> list[Column]:
-    columns = []
-    for name in MEASURES:
-        value = measure_column(name, 'worst_', NEVER_NEAR)
-        columns += [
-            value,
-            Column(f'{value.name}_of', TEXT, '', f'id of the other one at the worst {name}',
-                   empty=NEVER_NEAR),
-            Column(f'{value.name}_time_s', NUMBER, 's', f'time of the worst {name}, since the '
-                   'start of the run', variant='the first such moment', empty=NEVER_NEAR)]
-    return columns
-
-
-def _count_name(key: str) -> str:
-    """Return the column of a count."""
-    return f'plans_{key}' if key in ('accepted', 'refused', 'of_others', 'realigned') else key
-
-
 def _planning(run: Run) -> Iterator[Row]:
     for item in run.log.vehicles:
         answers, tally = run.answers.get(item.id), run.tallies.get(item.id)
         row: dict[str, object] = {} if answers is None else {
             'fallbacks': answers.fallback,
-            **{_count_name(key): getattr(answers, key) for key in COUNTS}}
+            **{name: getattr(answers, key) for name, (key, _) in COUNTS.items()}}
         if tally is not None:
             row['plans'] = tally.answers
             if tally.checked >= tally.answers:
@@ -201,7 +184,6 @@ def _planning(run: Run) -> Iterator[Row]:
         yield row
 
 
-FOLLOWING_COLUMNS = tuple(_following_columns())
 VEHICLE_PARTS = (
     TablePart((
         RUN, Column('id', TEXT, '', 'of the vehicle'),
@@ -225,7 +207,12 @@ VEHICLE_PARTS = (
         Column('min_acceleration', NUMBER, 'm/s^2', 'least, which is the hardest braking while '
                'it drives forwards', REAR_AXLE, AT_STEPS)), _drive),
     TablePart((
-        *_worst_columns(),
+        *(column for name in MEASURES for column in (
+            measure_column(name, 'worst_', NEVER_NEAR),
+            Column(f'worst_{name}_of', TEXT, '', f'id of the other one at the worst {name}',
+                   empty=NEVER_NEAR),
+            Column(f'worst_{name}_time_s', NUMBER, 's', f'time of the worst {name}, since the '
+                   'start of the run', variant='the first such moment', empty=NEVER_NEAR))),
         Column('max_inverse_ttc', NUMBER, '1/s', 'greatest 1 / ttc; 0 if it never approached a '
                'leader, so that means over vehicles count it', FOOTPRINTS,
                f'a ttc below {LEAST_TTC_S:g} s, as in a contact, counts as {LEAST_TTC_S:g} s'),
@@ -234,12 +221,11 @@ VEHICLE_PARTS = (
         Column('crossings', INTEGER, '1', 'rows of crossings with it'),
         Column('worst_pet_s', NUMBER, 's', 'least post-encroachment time', FOOTPRINTS,
                empty='it crossed no other path')), _criticality),
-    TablePart(FOLLOWING_COLUMNS, _following),
+    TablePart(tuple(_following_columns()), _following),
     VEHICLE_RULES,
     TablePart((
-        *(Column(_count_name(key), INTEGER, '1', what, variant='as the engine told last',
-                 empty=UNRECORDED)
-          for key, what in COUNTS.items()),
+        *(Column(name, INTEGER, '1', what, variant='as the engine told last', empty=UNRECORDED)
+          for name, (_, what) in COUNTS.items()),
         Column('fallbacks', INTEGER, '1', 'plans that braked because the planner failed',
                empty=UNRECORDED),
         Column('plans', INTEGER, '1', 'rows of plans of it', empty=UNRECORDED),
