@@ -37,16 +37,11 @@ def report(values: argparse.Namespace) -> int:
     )
     from crgame_ros.analysis.runs.run import Run
     from crgame_ros.recording.progress import on_stderr, Progress
+    from crgame_ros.recording.run_folder import recording_in
     check_report_runs(len(values.runs))
-    out = values.out or _place(values.runs[0])
+    out = values.out or recording_in(values.runs[0]).parent / REPORT_FILE
     check_report_path(out)
     write_report([Run.of_recording(path, values.epoch, progress=Progress(on_stderr).tell)
                   for path in values.runs], out)
     print(out)
     return 0
-
-
-def _place(path: Path) -> Path:
-    """Return the path of a run's report: in its folder, or beside a single recording."""
-    from crgame_ros.recording.run_folder import recording_in
-    return recording_in(path).parent / REPORT_FILE
