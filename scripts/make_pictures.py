@@ -11,10 +11,11 @@ from crgame_ros.analysis.pictures.figure_style import (
     figure_bytes,
     new_figure,
     paper_style,
+    POINTS,
     WIDTHS,
 )
 from crgame_ros.analysis.pictures.frame_axes import draw_frame
-from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps, POINTS
+from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps
 from crgame_ros.analysis.pictures.profiles_figure import (
     draw_line,
     draw_over_time,

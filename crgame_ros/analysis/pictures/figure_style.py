@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 # Widths on IEEE's two-column pages, by number of columns [inch].
 WIDTHS = {1: 3.5, 2: 7.16}
+POINTS = 72.0  # per inch
 FORMATS = ('svg', 'pdf', 'png')
 # Resolution of PNG, as journals require for line art with photographs [dots per inch].
 RESOLUTION = 300

@@ -13,6 +13,7 @@ from crgame_ros.analysis.pictures.figure_style import (
     panel_letter,
     paper_style,
     PERSON_COLOUR,
+    POINTS,
     tint,
     WIDTHS,
 )
@@ -23,7 +24,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-POINTS = 72.0
 # Least size of a metre, if the page is wide enough [pt].
 LEAST_METRE = 2.6
 # Gap between panels, and height of a line of the legend below them [pt].

@@ -9,7 +9,7 @@ from pathlib import Path
 from subprocess import CalledProcessError
 from typing import Any
 
-from crgame_ros.analysis.pictures.figure_style import new_figure, paper_style
+from crgame_ros.analysis.pictures.figure_style import new_figure, paper_style, POINTS
 from crgame_ros.analysis.pictures.frame_axes import draw_frame
 from crgame_ros.analysis.pictures.frame_window import FrameWindow
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
@@ -28,7 +28,7 @@ _FLATTEST, _HIGHEST = 0.3, 0.6
 MOST_RATE = 30.0
 # Distance shown around the vehicle in focus [m].
 VIDEO_REACH = 60.0
-_POINTS, _INCH_PX = 72.0, 160
+_INCH_PX = 160
 
 
 def write_video(scene: FrameScene, path: Path,
@@ -59,7 +59,7 @@ def write_video(scene: FrameScene, path: Path,
                 for artist in (*axes.patches, *axes.lines, *axes.collections, *axes.texts):
                     artist.remove()
                 frame = scene.at(int(scene.log.ks[row]), window)
-                draw_frame(axes, frame, figure.get_figwidth() * _POINTS / window.length,
+                draw_frame(axes, frame, figure.get_figwidth() * POINTS / window.length,
                            f'{frame.time_s:.1f} s')
                 writer.grab_frame()
                 progress((number + 1) / len(rows))
