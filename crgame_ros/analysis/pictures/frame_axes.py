@@ -87,7 +87,7 @@ TRACE_WIDTH, TRACE_DASHES = 1.1, (0, (4, 1.5))
 PLAN_WIDTH, PLAN_DOT = 0.6, 2.4
 
 
-def draw_frame(axes: Axes, frame: SceneFrame, metre: float, corner: str = '') -> None:
+def draw_frame(axes: Axes, frame: SceneFrame, metre: float, corner: str) -> None:
     """
     Draw a frame; the data coordinates are the window's own [m].
 
@@ -122,15 +122,14 @@ def draw_frame(axes: Axes, frame: SceneFrame, metre: float, corner: str = '') ->
                                    gid=f'front {body.id}'))
     halo = [withStroke(linewidth=1.6, foreground='white')]
     taken = (CORNER_SIZE * (CHARACTER_WIDTH * len(corner) + 1.0) / metre,
-             1.5 * CORNER_SIZE / metre) if corner else (0.0, 0.0)
+             1.5 * CORNER_SIZE / metre)
     for body, x, y in place_names(frame, NAME_SIZE / metre, taken):
         axes.text(x, y, body.id, color=shade(body.colour), fontsize=NAME_SIZE, ha='center',
                   va='center_baseline', zorder=7, path_effects=halo, gid=f'name {body.id}')
-    if corner:
-        axes.annotate(corner, (0.0, 1.0), (1.7, -1.7), xycoords='axes fraction',
-                      textcoords='offset points', ha='left', va='top', fontsize=CORNER_SIZE,
-                      color=INK, zorder=8,
-                      bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 1.2})
+    axes.annotate(corner, (0.0, 1.0), (1.7, -1.7), xycoords='axes fraction',
+                  textcoords='offset points', ha='left', va='top', fontsize=CORNER_SIZE,
+                  color=INK, zorder=8,
+                  bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 1.2})
 
 
 def _draw_road(axes: Axes, frame: SceneFrame) -> None:
