@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables of criticality: the measures of each pair at each step, and crossings."""
 
+from collections.abc import Sequence
+
 from crgame_ros.analysis.criticality.car_following_measures import NO_LEADER
-from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
+from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES, TickMeasures
 from crgame_ros.analysis.criticality.nearby_footprints import NEAR
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
@@ -18,7 +20,6 @@ from crgame_ros.analysis.tables.column import (
 )
 from crgame_ros.analysis.tables.writer import TableRows
 import numpy as np
-from numpy.typing import NDArray
 import pyarrow as pa
 
 NOT_THE_LEADER = 'the other is not its leader'
@@ -71,8 +72,8 @@ def write_criticality(run: Run, pairs: TableRows, crossings: TableRows) -> None:
     """
     collected = _Collected(run, pairs)
     criticality = run.measure(collected.add)
-    collected.flush()
     ids = criticality.ids
+    collected.flush(ids)
     crossings.add_rows({
         'run': run.id, 'first': ids[each.first], 'second': ids[each.second],
         'entered_s': each.entered_s, 'pet_s': each.pet_s, 'is_estimate': each.is_estimate}
@@ -80,39 +81,33 @@ def write_criticality(run: Run, pairs: TableRows, crossings: TableRows) -> None:
 
 
 class _Collected:
-    """A buffer of rows of pairs, written in larger pieces."""
+    """A buffer of the measures of pairs, written in larger pieces."""
 
     def __init__(self, run: Run, pairs: TableRows) -> None:
         self._run, self._pairs = run, pairs
-        self._ids: pa.Array | None = None
-        self._steps: list[tuple[int, int, int]] = []
-        self._others: list[NDArray[np.int64]] = []
-        self._values: list[NDArray[np.float64]] = []
+        self._steps: list[tuple[int, TickMeasures]] = []
         self._rows = 0
 
     def add(self, criticality: Criticality) -> None:
         """Add the measures of a step."""
-        if self._ids is None:
-            self._ids = pa.array(criticality.ids, TEXT)
         k = self._run.game.scheduler.k(criticality.n)
-        for subject, others, values, _ in criticality.latest:
-            self._steps.append((k, subject, len(others)))
-            self._others.append(others)
-            self._values.append(values)
-            self._rows += len(others)
+        for tick in criticality.latest:
+            self._steps.append((k, tick))
+            self._rows += len(tick.others)
         if self._rows >= _BUFFERED_ROWS:
-            self.flush()
+            self.flush(criticality.ids)
 
-    def flush(self) -> None:
+    def flush(self, ids: Sequence[str]) -> None:
         """Write the buffered rows."""
-        if not self._rows or self._ids is None:
+        if not self._rows:
             return
-        ks, subjects, counts = np.array(self._steps).T
-        ks, subjects = np.repeat(ks, counts), np.repeat(subjects, counts)
-        values = np.concatenate(self._values)
+        names, ticks = pa.array(ids, TEXT), [tick for _, tick in self._steps]
+        counts = [len(tick.others) for tick in ticks]
+        ks = np.repeat([k for k, _ in self._steps], counts)
+        values = np.concatenate([tick.values for tick in ticks])
         self._pairs.add({
             'run': self._run.id, 'k': ks, 'time_s': self._run.seconds_at(ks),
-            'subject': self._ids.take(pa.array(subjects)),
-            'other': self._ids.take(pa.array(np.concatenate(self._others))),
+            'subject': names.take(pa.array(np.repeat([tick.subject for tick in ticks], counts))),
+            'other': names.take(pa.array(np.concatenate([tick.others for tick in ticks]))),
             **{name: values[:, column] for column, name in enumerate(MEASURES)}})
-        self._steps, self._others, self._values, self._rows = [], [], [], 0
+        self._steps, self._rows = [], 0
