@@ -50,7 +50,7 @@ def frames_figure(scene: FrameScene, ks: Sequence[int], vehicles: Sequence[str] 
     length, height = windows[0].length, windows[0].height
     across = _panels_across(len(ks), width, length, height)
     rows = -(-len(ks) // across)
-    metre = (width - (across - 1) * GAP) / across / length
+    metre = _metre(across, width, length)
     handles = _handles(scene, frames)
     # A narrow figure has a legend of two lines.
     legend = 3.0 + LEGEND_LINE * -(-len(handles) // (4 * columns))
@@ -74,13 +74,15 @@ def frames_figure(scene: FrameScene, ks: Sequence[int], vehicles: Sequence[str] 
     return figure
 
 
+def _metre(across: int, width: float, length: float) -> float:
+    """Return the size of a metre in panels side by side [pt]."""
+    return (width - (across - 1) * GAP) / across / length
+
+
 def _panels_across(count: int, width: float, length: float, height: float) -> int:
     """Return the number of panels side by side: many, but large enough, and on one page."""
-    best = 1
-    for across in range(2, count + 1):
-        metre = (width - (across - 1) * GAP) / across / length
-        if metre >= LEAST_METRE:
-            best = across
+    best = max((across for across in range(2, count + 1)
+                if _metre(across, width, length) >= LEAST_METRE), default=1)
     while best < count and -(-count // best) * height * width / best / length \
             > MOST_HEIGHT * POINTS - 2.0 * LEGEND_LINE:
         best += 1
