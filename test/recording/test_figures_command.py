@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from crgame_ros.analysis.pictures.scene_frame import read_followed_plans
+from crgame_ros.analysis.pictures.scene_frame import followed_plans
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.cli import main
 from crgame_ros.game.game import Game, load_game
@@ -14,6 +14,7 @@ from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.offline_recording import write_recording
 from crgame_ros.recording.recorded_game import recorded_inputs
+from crgame_ros.recording.recorded_plans import read_plans
 from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
@@ -116,7 +117,7 @@ def test_two_runs_are_compared(run: Path, result: OfflineResult, recorder: Any, 
 def test_plans_are_drawn_as_recorded(run: Path, result: OfflineResult) -> None:
     """They hold 30 ms after the request; the first, for which the run waits, from the start."""
     log = read_trajectories(run / 'bag')
-    (plans,) = read_followed_plans(run / 'bag', log).values()
+    (plans,) = followed_plans(log.game, read_plans(run / 'bag')).values()
     assert [plan.stamp_s for plan in plans] == pytest.approx(0.5 * np.arange(len(plans)))
     assert [plan.start_s for plan in plans] == pytest.approx(
         [0.0, *(0.5 * np.arange(1, len(plans)) + 0.03)])

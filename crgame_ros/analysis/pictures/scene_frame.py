@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scene of a run at one moment from above, as data for all renderers of frames."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import math
-from pathlib import Path
 from typing import NamedTuple
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking
@@ -22,8 +21,9 @@ from crgame_ros.analysis.pictures.frame_window import (
     series_windows,
 )
 from crgame_ros.errors import InputError
+from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.objects import ObjectDescription, Role
-from crgame_ros.recording.recorded_plans import read_plans
+from crgame_ros.recording.recorded_plans import RecordedPlan
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.surface import lanelet_polygons, polygons_of, road_surface, seam_patches
@@ -60,35 +60,30 @@ class FollowedPlan(NamedTuple):
     poses: NDArray[np.float64]
 
 
-def read_followed_plans(bag: Path, log: RunTrajectories,
-                        progress: Callable[[float], object] | None = None
-                        ) -> dict[str, tuple[FollowedPlan, ...]]:
+def followed_plans(game: GameDocument,
+                   plans: Iterable[RecordedPlan]) -> dict[str, list[FollowedPlan]]:
     """
-    Read the plans of each AV; empty where they were not recorded.
+    Return the plans of each AV that has one.
 
     The recording does not show which plans the engine accepted: refused ones are included.
 
-    :param log: log of the same run.
-    :param progress: called with the share of the recording read so far, 0 to 1.
-    :raises InputError: as `read_plans`.
+    :param plans: as `read_plans` yields them.
     """
-    scheduler = log.game.scheduler
-    found: dict[str, list[FollowedPlan]] = {av.id: [] for av in log.game.avs}
-    for recorded in read_plans(bag, log.game.epoch, progress):
-        av = log.game.av(recorded.av)
+    scheduler = game.scheduler
+    found: dict[str, list[FollowedPlan]] = {av.id: [] for av in game.avs}
+    for recorded in plans:
+        av = game.av(recorded.av)
         if recorded.plan is None or recorded.k is None or av is None:
             continue
         stamp_s = (recorded.stamp_ns - scheduler.clock_offset_ns) * 1e-9
         # The run waits for the first answer; another one to the same request has no latency.
         waited_s = 0.0 if stamp_s == 0.0 or math.isnan(recorded.latency_s) \
-            else recorded.latency_s * log.game.real_time_factor
-        start_s = stamp_s + waited_s
+            else recorded.latency_s * game.real_time_factor
         known = found[av.id]
-        if known and start_s < known[-1].start_s:
-            start_s = known[-1].start_s
+        start_s = max(stamp_s + waited_s, known[-1].start_s if known else -math.inf)
         known.append(FollowedPlan(start_s, stamp_s,
                                   av.transform.to_simulation(recorded.plan.states[:, :3])))
-    return {av_id: tuple(plans) for av_id, plans in found.items() if plans}
+    return {av_id: known for av_id, known in found.items() if known}
 
 
 class RoadInWindow(NamedTuple):

@@ -246,11 +246,8 @@ class Run:
     @cached_property
     def scene(self) -> 'FrameScene':
         """Read what pictures show, with the plans that AVs followed."""
-        from crgame_ros.analysis.pictures.scene_frame import FrameScene, read_followed_plans
-        if self.bag is None:
-            return FrameScene(self.log)
-        return FrameScene(self.log, read_followed_plans(
-            self.bag, self.log, self.telling('reading the plans of')))
+        from crgame_ros.analysis.pictures.scene_frame import followed_plans, FrameScene
+        return FrameScene(self.log, followed_plans(self.game, self.plans() or ()))
 
     def plans(self) -> Iterator[RecordedPlan] | None:
         """Read the recorded plans one by one; None of an offline run."""
