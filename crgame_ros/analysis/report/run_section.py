@@ -33,8 +33,7 @@ def run_section(run: Run) -> Section:
     html += filled_table('Drivers', (
         'vehicle', 'driver', 'took part as', 'device', 'browser', 'steps', 'input delay [ms]'),
         _people(run), 'people')
-    notices = dict.fromkeys((*run.missing, *run.notices))
-    if notices:
+    if notices := dict.fromkeys((*run.missing, *run.notices)):
         items = ''.join(f'<li>{free(text)}</li>' for text in notices)
         html += f'<div class="notices"><p>Of the recording:</p><ul>{items}</ul></div>'
     if game.file:
@@ -74,12 +73,9 @@ def _facts(run: Run) -> Iterator[tuple[str, str]]:
     yield 'traffic', _traffic(game)
     yield 'others', _others(run)
     yield 'run', f'{game.epoch + 1} of its session'
-    sound = '; '.join(_sound(run))
-    if sound:
-        yield 'sound', sound
-    view = '; '.join(_view(run))
-    if view:
-        yield 'view', view
+    for name, parts in (('sound', _sound(run)), ('view', _view(run))):
+        if told := '; '.join(parts):
+            yield name, told
 
 
 def _sound(run: Run) -> Iterator[str]:
