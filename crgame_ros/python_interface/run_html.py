@@ -32,7 +32,7 @@ def _picture(run: Run) -> str:
     if not run.vehicles or not run.moments:
         return ''
     moment = run.moments[0]
-    image = moment_image(FrameScene(run.log), moment, run.vehicles)
+    image = moment_image(FrameScene(run.log), moment)
     return (f'<figure>{image}<figcaption>{number(moment.time_s, 1)} s: '
             f'{free(moment.why)}</figcaption></figure>')
 

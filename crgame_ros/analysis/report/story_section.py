@@ -2,13 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The section that shows a run in frames, at its important moments."""
 
-from collections.abc import Sequence
 from urllib.parse import quote
 
-from crgame_ros.analysis.pictures.critical_moments import (
-    Moment,
-    nearest_moment,
-)
+from crgame_ros.analysis.pictures.critical_moments import Moment, nearest_moment
 from crgame_ros.analysis.pictures.frame_svg import frame_svg
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.analysis.report.section import free, note, NOTHING, number, plain, Section
@@ -20,16 +16,13 @@ _WIDTH = 560
 _SAFE = " =:;/,.-+()!*?@$'"
 
 
-def moment_image(scene: FrameScene, moment: Moment, driven: Sequence[str]) -> str:
-    """
-    Return an element `img` with the scene from above, around the vehicles of a moment.
-
-    :param driven: ids of the driven vehicles, which are labelled.
-    """
+def moment_image(scene: FrameScene, moment: Moment) -> str:
+    """Return an element `img` with the scene from above, around the vehicles of a moment."""
     k = scene.k_at(moment.time_s)
     # Each picture has its own window, centred on the vehicles of its moment.
     window = scene.windows([scene.row(k)], moment.vehicles)[0]
-    svg = frame_svg(scene.at(k, window, {*driven, *moment.vehicles}), _WIDTH)
+    labelled = {*(item.id for item in scene.log.vehicles), *moment.vehicles}
+    svg = frame_svg(scene.at(k, window, labelled), _WIDTH)
     words = f'{moment.time_s:.1f} s: {moment.why}'
     return (f'<img alt="The scene from above at {plain(words)}" '
             f'src="data:image/svg+xml,{quote(svg, safe=_SAFE)}">')
@@ -40,14 +33,11 @@ def story_section(run: Run) -> Section | None:
     if not run.log.vehicles:
         return None
     scene = FrameScene(run.log)
-    driven = [item.id for item in run.log.vehicles]
-    figures = []
-    for place, moment in enumerate(run.story):
-        figures.append(
-            f'<figure class="frame" id="{frame_address(run, place)}" tabindex="-1" '
-            f'data-time="{moment.time_s:.6f}">{moment_image(scene, moment, driven)}'
-            f'<figcaption><b>{number(moment.time_s, 1)} s</b> {free(moment.why)}</figcaption>'
-            '</figure>')
+    figures = [
+        f'<figure class="frame" id="{frame_address(run, place)}" tabindex="-1" '
+        f'data-time="{moment.time_s:.6f}">{moment_image(scene, moment)}'
+        f'<figcaption><b>{number(moment.time_s, 1)} s</b> {free(moment.why)}</figcaption>'
+        '</figure>' for place, moment in enumerate(run.story)]
     return Section('story', 'The story', note(
         'The scene from above at the moments that count, each turned so that the vehicle in focus '
         'drives to the right. Humans are warm, AVs cold colours, all others grey; behind each '
