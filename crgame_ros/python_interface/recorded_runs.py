@@ -223,19 +223,14 @@ def export(runs: Run | FileName | Sequence[Run | FileName], folder: FileName, *,
     :return: the folder.
     :raises InputError: if a run cannot be read, or the folder is not writable.
     """
-    from crgame_ros.analysis.tables.run_tables import own_id, write_tables
+    from crgame_ros.analysis.tables.run_tables import write_tables
     from crgame_ros.analysis.tables.writer import FORMATS
     out = as_path(folder, 'folder')
     file_format = next((name for name in FORMATS if name == to), None)
     if file_format is None:
         raise InputError(f'is "{to}"', 'to', f'give one of {", ".join(FORMATS)}')
-    tabulated, ids = [], set[str]()
-    for each in _several(runs):
-        found = each.scored('all' if scores else 'none')
-        found.id = own_id(found.id, ids)
-        ids.add(found.id)
-        tabulated.append(found)
-    write_tables(tabulated, out, file_format)
+    write_tables([each.scored('all' if scores else 'none') for each in _several(runs)], out,
+                 file_format)
     return out
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fills all tables of runs, and writes them into a folder."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 import json
 from pathlib import Path
@@ -115,13 +115,12 @@ TABLES: tuple[TableDeclaration, ...] = (
 def runs_in(paths: Sequence[Path], epoch: int | None, progress: RunProgress,
             scoring: Scoring = 'all') -> Iterator[Run]:
     """
-    Read runs one after the other, with different ids.
+    Read runs one after the other.
 
     :param paths: folders of runs, or recordings.
     :param epoch: number of the run where a recording holds several; None for the last.
     :raises InputError: if one cannot be read, or is given twice.
     """
-    ids: set[str] = set()
     taken: set[tuple[Path, int]] = set()
     for path in paths:
         run = Run.of_recording(path, epoch, scoring=scoring, progress=progress)
@@ -129,22 +128,7 @@ def runs_in(paths: Sequence[Path], epoch: int | None, progress: RunProgress,
         if place in taken:
             raise InputError('this run is given twice', str(path), 'give each run once')
         taken.add(place)
-        run.id = own_id(run.id, ids)
-        ids.add(run.id)
         yield run
-
-
-def own_id(name: str, taken: Collection[str]) -> str:
-    """
-    Return a unique id for a run: folders in different places may have the same name.
-
-    :param taken: ids of the others.
-    """
-    found, number = name, 1
-    while found in taken:
-        number += 1
-        found = f'{name}~{number}'
-    return found
 
 
 def write_tables(runs: Iterable[Run], out: Path, file_format: Format) -> dict[str, int]:
@@ -153,14 +137,20 @@ def write_tables(runs: Iterable[Run], out: Path, file_format: Format) -> dict[st
 
     Runs are processed one after the other, so that memory is that of one run.
 
-    :param runs: runs with different ids.
+    :param runs: their ids are made unique: folders in different places may have the same name.
     :param out: the folder; an earlier export in it is replaced.
     :param file_format: Parquet or CSV.
     :return: number of rows by table.
     :raises InputError: if a scenario cannot be used, or the folder cannot be written.
     """
+    ids: set[str] = set()
     with table_folder(out, TABLES, file_format, 'tables') as writers:
         for run in runs:
+            name, number = run.id, 1
+            while run.id in ids:
+                number += 1
+                run.id = f'{name}~{number}'
+            ids.add(run.id)
             _add_run(run, writers)
         return {name: writer.rows for name, writer in writers.items()}
 
