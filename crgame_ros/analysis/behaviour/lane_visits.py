@@ -9,6 +9,7 @@ from typing import NamedTuple, Self
 
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.geometry.curve import Curve
+from crgame_ros.geometry.outline import placed
 from crgame_ros.roads.network import RoadNetwork
 import numpy as np
 from numpy.typing import NDArray
@@ -252,6 +253,4 @@ def wheels_of(rear: FloatArray, wheelbase: float, width: float) -> FloatArray:
     """
     half = 0.5 * width
     own = np.array([(0.0, half), (0.0, -half), (wheelbase, half), (wheelbase, -half)])
-    cos, sin = np.cos(rear[:, 2, None]), np.sin(rear[:, 2, None])
-    return np.stack((rear[:, 0, None] + cos * own[:, 0] - sin * own[:, 1],
-                     rear[:, 1, None] + sin * own[:, 0] + cos * own[:, 1]), axis=-1)
+    return placed(own, rear)

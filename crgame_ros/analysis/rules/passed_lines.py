@@ -9,6 +9,7 @@ from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.traffic_light import TrafficLight
 from crgame_ros.analysis.behaviour.lane_visits import LaneVisits
+from crgame_ros.geometry.curve import arc_length
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signs import (
@@ -137,7 +138,7 @@ def _line_crossings(lines: Sequence[StopLine], poses: FloatArray, front: float,
         return []
     fronts = shifted(poses, front)[:, :2]
     found = sorted(_crossings(lines, poses, fronts, jumps), key=lambda x: (x.row, x.part))
-    gone = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(fronts, axis=0).T))))
+    gone = arc_length(fronts)
     halts: list[list[LineCrossing]] = []
     for each in found:
         if halts and gone[each.row] - gone[halts[-1][0].row] < TOGETHER:
@@ -258,8 +259,7 @@ class LineRules:
         """List the lanelets in which the centre was from a row on."""
         poses = track.states[row:, :3]
         later = [jump - row for jump in track.jumps if jump > row]
-        gone = np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))
-        end = min([1 + int(np.searchsorted(gone, FAR)), *later])
+        end = min([int(np.searchsorted(arc_length(poses[:, :2]), FAR)), *later])
         visits = LaneVisits(self._roads).follow(shifted(poses[:end], track.rear_to_center))
         return tuple(visit.lanelet for visit in visits)
 

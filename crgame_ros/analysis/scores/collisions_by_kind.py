@@ -9,6 +9,8 @@ from crgame_ros.analysis.scores.route_progress import LanesDriven
 from crgame_ros.analysis.scores.scored_drive import ScoredDrive, Track, TrackKind
 from crgame_ros.drivability.contact import Kind
 from crgame_ros.geometry.outline import outline, placed
+from crgame_ros.geometry.reference_point import seen_from
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.vehicle.state import REST
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +57,7 @@ def find_collisions(drive: ScoredDrive, lanes: LanesDriven) -> tuple[JudgedColli
     """
     found = []
     for track in drive.tracks:
-        step = _first_touch(drive, track)
+        step = first_contact(drive.shape, drive.poses, track.shape, track.poses)
         if step is None:
             continue
         kind = _kind(drive, track, step)
@@ -73,23 +75,20 @@ def angle_to(rear_axles: FloatArray, points: FloatArray) -> FloatArray:
     :param rear_axles: (..., 3)
     :param points: (..., 2)
     """
-    offset = points - rear_axles[..., :2]
-    along = offset[..., 0] * np.cos(rear_axles[..., 2]) + offset[..., 1] * np.sin(
-        rear_axles[..., 2])
-    across = offset[..., 1] * np.cos(rear_axles[..., 2]) - offset[..., 0] * np.sin(
-        rear_axles[..., 2])
+    along, across = seen_from(rear_axles, points)
     return np.abs(np.arctan2(across, along))
 
 
-def _first_touch(drive: ScoredDrive, track: Track) -> int | None:
-    reach = drive.shape.radius + track.shape.radius
-    apart = np.hypot(*(track.poses[:, :2] - drive.poses[:, :2]).T)
-    near = np.flatnonzero(apart <= reach)
+def first_contact(shape: Shape, poses: FloatArray, other: Shape,
+                  other_poses: FloatArray) -> int | None:
+    """Return the first row at which two shapes at poses (K, 3) touch; None without one."""
+    apart = np.hypot(*(other_poses - poses)[:, :2].T)
+    near = np.flatnonzero(apart <= shape.radius + other.radius)
     if not len(near):
         return None
-    own = shapely.polygons(drive.outlines[near])
-    theirs = shapely.polygons(placed(outline(track.shape), track.poses[near]))
-    touching = near[shapely.intersects(own, theirs)]
+    touching = near[shapely.intersects(
+        shapely.polygons(placed(outline(shape), poses[near])),
+        shapely.polygons(placed(outline(other), other_poses[near])))]
     return int(touching[0]) if len(touching) else None
 
 

@@ -13,6 +13,7 @@ from crgame_ros.analysis.scores.collisions_by_kind import (
     angle_to,
     BEHIND,
     find_collisions,
+    first_contact,
     JudgedCollision,
 )
 from crgame_ros.analysis.scores.route_progress import (
@@ -26,7 +27,7 @@ from crgame_ros.analysis.scores.route_progress import (
 from crgame_ros.analysis.scores.scored_drive import ScoredDrive, Track, TrackKind
 from crgame_ros.errors import InputError
 from crgame_ros.filters import smoothed
-from crgame_ros.geometry.outline import outline, placed
+from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.roads.boundary import RoadBoundary
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets, start_lanelet
@@ -34,7 +35,6 @@ from crgame_ros.scenario.exact_values import exact_position
 from crgame_ros.scenario.loading import LoadedScenario
 import numpy as np
 from numpy.typing import NDArray
-import shapely
 
 FloatArray = NDArray[np.float64]
 
@@ -88,23 +88,9 @@ def times_to_contact(drive: ScoredDrive, lanes: LanesDriven,
 def _time(drive: ScoredDrive, track: Track, step: int) -> float:
     """Return the time of the first sample at which two footprints touch, at constant velocity."""
     ahead_s = STRIDE_S * np.arange(1.0, round(HORIZON_S / STRIDE_S))
-    own = _moved(drive.poses[step], float(drive.speeds[step]), ahead_s)
-    theirs = _moved(track.poses[step], float(track.speeds[step]), ahead_s)
-    near = np.flatnonzero(np.hypot(*(own - theirs)[:, :2].T)
-                          <= drive.shape.radius + track.shape.radius)
-    if not len(near):
-        return np.inf
-    touching = shapely.intersects(
-        shapely.polygons(placed(outline(drive.shape), own[near])),
-        shapely.polygons(placed(outline(track.shape), theirs[near])))
-    hits = near[touching]
-    return float(ahead_s[hits[0]]) if len(hits) else np.inf
-
-
-def _moved(pose: FloatArray, speed: float, ahead_s: FloatArray) -> FloatArray:
-    way = speed * ahead_s
-    return np.stack((pose[0] + way * np.cos(pose[2]), pose[1] + way * np.sin(pose[2]),
-                     np.full_like(way, pose[2])), axis=-1)
+    hit = first_contact(drive.shape, shifted(drive.poses[step], drive.speeds[step] * ahead_s),
+                        track.shape, shifted(track.poses[step], track.speeds[step] * ahead_s))
+    return np.inf if hit is None else float(ahead_s[hit])
 
 
 class Bound(NamedTuple):

@@ -80,7 +80,7 @@ class ScoredDrive:
     @functools.cached_property
     def outlines(self) -> FloatArray:
         """Return corners (K, C, 2) of the footprint [m]; of a rectangle FL, RL, RR, FR."""
-        return placed(outline(self.shape), self.poses[:, None, :][:, 0])
+        return placed(outline(self.shape), self.poses)
 
 
 def kind_of_type(type_name: str) -> TrackKind:
