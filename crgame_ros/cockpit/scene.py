@@ -18,7 +18,7 @@ from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.task_spec import answer_key, TaskSpec
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.roads.network import RoadNetwork
+from crgame_ros.roads.network import first_of_junctions, RoadNetwork
 from crgame_ros.roads.signs import stop_line_ends
 from crgame_ros.roads.surface import lanelet_areas
 from crgame_ros.scenario.exact_values import group_outline
@@ -142,12 +142,7 @@ def lanelet_entries(network: LaneletNetwork,
     :param heights: heights of the lanelets that have any
     """
     roads = RoadNetwork(network)
-    crossing = {
-        int(lanelet_id) for intersection in network.intersections
-        for incoming in intersection.incomings
-        for successors in (incoming.successors_left, incoming.successors_straight,
-                           incoming.successors_right)
-        for lanelet_id in successors or ()}
+    crossing = first_of_junctions(network)
     return [_lanelet(lanelet, roads, crossing, heights.get(int(lanelet.lanelet_id)))
             for lanelet in network.lanelets]
 

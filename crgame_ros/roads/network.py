@@ -124,6 +124,15 @@ class RoadNetwork:
             scores[mine] = self._scores(int(lane), poses[rows[mine], :2], poses[rows[mine], 2])
         return rows, lanes, scores
 
+    def lanelets_near(self, points: FloatArray, distance: float) -> list[frozenset[int]]:
+        """Return the lanelets within a distance [m] of each of points (N, 2)."""
+        rows, hits = self._tree.query(shapely.points(points), predicate='dwithin',
+                                      distance=distance)
+        found: list[set[int]] = [set() for _ in points]
+        for row, hit in zip(rows.tolist(), hits.tolist(), strict=True):
+            found[row].add(self.lanelet_ids[hit])
+        return [frozenset(each) for each in found]
+
     def pose_on(self, lanelet_id: int, s: float, d: float = 0.0) -> tuple[float, float, float]:
         """
         Return the pose at arc length s and offset d to the left of a centre line.
@@ -305,6 +314,13 @@ class RoadNetwork:
             if gap <= _MAX_GAP and candidate != lanelet_id:
                 scored.append((not self.is_drivable(candidate), turn, candidate))
         return min(scored)[2] if scored else None
+
+
+def first_of_junctions(network: LaneletNetwork) -> set[int]:
+    """Return the lanelets that the map names as the first ones behind incomings of junctions."""
+    return {int(lanelet) for intersection in network.intersections
+            for each in intersection.incomings for lanelet in
+            each.successors_left | each.successors_straight | each.successors_right}
 
 
 def _is_for_cars(lanelet: Lanelet) -> bool:

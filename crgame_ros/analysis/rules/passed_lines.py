@@ -11,7 +11,7 @@ from commonroad.scenario.traffic_light import TrafficLight
 from crgame_ros.analysis.behaviour.lane_visits import LaneVisits
 from crgame_ros.geometry.curve import arc_length
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.roads.network import RoadNetwork
+from crgame_ros.roads.network import first_of_junctions, RoadNetwork
 from crgame_ros.roads.signs import (
     governing_lights,
     has_arrow,
@@ -67,7 +67,10 @@ class StopLine(NamedTuple):
 
 def _find_stop_lines(network: LaneletNetwork) -> tuple[StopLine, ...]:
     """List the lines of a map that have lights or a stop sign."""
-    inner = _first_of_junctions(network)
+    # Those that the file names as first of a junction but not as incoming.
+    inner = first_of_junctions(network) - {
+        i for intersection in network.intersections for each in intersection.incomings
+        for i in each.incoming_lanelets or ()}
     found = []
     for lanelet in network.lanelets:
         lights, sign = lights_of(lanelet, network), has_stop_sign(lanelet, network)
@@ -76,16 +79,6 @@ def _find_stop_lines(network: LaneletNetwork) -> tuple[StopLine, ...]:
             begins = lanelet.stop_line is None and not sign and lanelet.lanelet_id in inner
             found.append(_line(lanelet, begins, lights, sign))
     return tuple(found)
-
-
-def _first_of_junctions(network: LaneletNetwork) -> set[int]:
-    """Return the lanelets that the file names as first of a junction but not as incoming."""
-    incomings = [each for intersection in network.intersections
-                 for each in intersection.incomings]
-    first = {i for each in incomings for names in (
-        each.successors_left, each.successors_straight, each.successors_right)
-        for i in names or ()}
-    return first - {i for each in incomings for i in each.incoming_lanelets or ()}
 
 
 def _line(lanelet: Lanelet, begins: bool, lights: Sequence[TrafficLight],
