@@ -23,6 +23,7 @@ from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.occupancy.map_file import INDEX_NAME, map_text, RasterSpec, read_map_file
 from crgame_ros.occupancy.sources import MAX_TILES, tile_name, write_pgm
 from crgame_ros.roads.surface import (
+    filled,
     lanelet_polygons,
     polygons_of,
     road_surface,
@@ -64,8 +65,8 @@ def curbs(network: LaneletNetwork, origin: tuple[float, float], spec: RasterSpec
     :return: polygons that touch the road but do not overlap it.
     """
     polygons = lanelet_polygons(network.lanelets, origin)
-    surface = _without_gaps(road_surface(polygons, seam_patches(shapely.union_all(polygons))),
-                            spec.min_island)
+    surface = filled(road_surface(polygons, seam_patches(shapely.union_all(polygons))),
+                     lambda hole: hole.area < spec.min_island)
     outline = surface.boundary
     if not spec.close_ends:
         outline = _without(outline, road_ends(network, origin))
@@ -87,14 +88,6 @@ def road_ends(network: LaneletNetwork, origin: tuple[float, float]) -> shapely.M
                 ends = (lanelet.left_vertices[row, :2], lanelet.right_vertices[row, :2])
                 lines.append(shapely.LineString([end - origin for end in ends]))
     return shapely.MultiLineString(lines)
-
-
-def _without_gaps(surface: shapely.Geometry, min_island: float) -> shapely.MultiPolygon:
-    """Fill the holes in a surface that are smaller than an island [m^2]."""
-    return shapely.MultiPolygon([
-        shapely.Polygon(part.exterior, [ring for ring in part.interiors
-                                        if shapely.Polygon(ring).area >= min_island])
-        for part in polygons_of(surface)])
 
 
 def _leads_on(lanelet: Lanelet, is_exit: bool, known: dict[int, Lanelet]) -> bool:

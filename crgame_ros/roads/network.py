@@ -11,7 +11,7 @@ from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
 from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.polyline import EQUAL_DIGITS
 from crgame_ros.roads.signs import speed_limit
-from crgame_ros.roads.surface import lanelet_areas
+from crgame_ros.roads.surface import filled, lanelet_areas
 import numpy as np
 from numpy.typing import NDArray
 import shapely
@@ -264,10 +264,8 @@ class RoadNetwork:
         """Return the road for vehicles as one area, with slits and small islands filled."""
         on = self._drivable | [not x.lanelet_type & _NO_ROAD for x in self._lanelets]
         road = shapely.buffer(shapely.buffer(shapely.union_all(self._areas[on]), _SLIT), -_SLIT)
-        return shapely.union_all([
-            shapely.Polygon(part.exterior, [ring for ring in part.interiors
-                                            if shapely.Polygon(ring).area > _ISLAND])
-            for part in shapely.get_parts(road)])
+        return shapely.union_all(shapely.get_parts(
+            filled(road, lambda hole: not hole.area > _ISLAND)))
 
     def area_of(self, lanelet_ids: Iterable[int]) -> shapely.Geometry:
         """Return some lanelets as one area."""

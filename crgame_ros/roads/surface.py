@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The road as a surface: the union of all lanelets, closed over the seams between them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from commonroad.scenario.lanelet import Lanelet
 import numpy as np
@@ -59,14 +59,19 @@ def seam_patches(surface: shapely.Geometry) -> list[shapely.Polygon]:
 def road_surface(polygons: Sequence[shapely.Polygon],
                  patches: Sequence[shapely.Polygon]) -> shapely.Geometry:
     """Return polygons and patches as one surface, prepared for tests of containment."""
-    united = shapely.union_all([*polygons, *patches])
     # The union has new holes of rounding width along the edges of the patches.
-    surface = shapely.MultiPolygon([
-        shapely.Polygon(part.exterior, [hole.exterior for hole in _holes(part)
-                                        if not _is_narrow(hole)])
-        for part in polygons_of(united)])
+    surface = filled(shapely.union_all([*polygons, *patches]), _is_narrow)
     shapely.prepare(surface)
     return surface
+
+
+def filled(surface: shapely.Geometry,
+           is_small: Callable[[shapely.Polygon], bool]) -> shapely.MultiPolygon:
+    """Return a surface without its small holes."""
+    return shapely.MultiPolygon([
+        shapely.Polygon(part.exterior, [hole.exterior for hole in _holes(part)
+                                        if not is_small(hole)])
+        for part in polygons_of(surface)])
 
 
 def polygons_of(geometry: shapely.Geometry | NDArray[np.object_]) -> list[shapely.Polygon]:
