@@ -19,6 +19,7 @@ from crgame_ros.analysis.scores.scored_drive import drive_among, ScoredDrive, Tr
 from crgame_ros.analysis.scores.scored_drives import recorded_expert
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_judge import (
+    failures,
     poses_of,
     SolutionJudge,
     SolutionScores,
@@ -113,17 +114,10 @@ def _failures(scored: ScoredScenario, solution: Solution) -> dict[str, str]:
     """Run the checks that concern a solution as a whole; return failures by name."""
     from crgame_ros.analysis.scores.checker import solution_checker
     problems = PlanningProblemSet(list(scored.loaded.planning_problems))
-    failed = {}
-    for name, check in (
-            ('solved_all_problems',
-             lambda: solution_checker.solved_all_problems(problems, solution)),
-            ('ego_collision', lambda: solution_checker.ego_collision(
-                scored.loaded.scenario, problems, solution))):
-        try:
-            check()
-        except Exception as error:  # the checker can raise any exception
-            failed[name] = one_line(str(error) or type(error).__name__)
-    return failed
+    return failures({
+        'solved_all_problems': lambda: solution_checker.solved_all_problems(problems, solution),
+        'ego_collision': lambda: solution_checker.ego_collision(
+            scored.loaded.scenario, problems, solution)})
 
 
 def _has_rear_axles(found: PlanningProblemSolution, problem: PlanningProblem,

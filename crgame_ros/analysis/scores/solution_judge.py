@@ -5,7 +5,12 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from commonroad.common.solution import CostFunction, PlanningProblemSolution, Solution
+from commonroad.common.solution import (
+    CostFunction,
+    PlanningProblemSolution,
+    Solution,
+    vehicle_parameters,
+)
 from commonroad.planning.planning_problem import PlanningProblem, PlanningProblemSet
 from commonroad.scenario.scenario import Scenario, ScenarioID
 from commonroad.scenario.state import TraceState
@@ -73,14 +78,9 @@ def _check_solution(scenario: Scenario, problem: PlanningProblem,
             solution, problems),
         'obstacle_collision': lambda: solution_checker.obstacle_collision(
             scenario, problems, solution)}
-    failed = dict(earlier)
-    for name, check in checks.items():
-        try:
-            check()
-        except Exception as error:  # the checker can raise any exception
-            failed[name] = one_line(str(error) or type(error).__name__)
-    shape = _shape(found)
-    off = np.flatnonzero(boundary.are_off_road(poses, shape))
+    failed = {**earlier, **failures(checks)}
+    known = vehicle_parameters[found.vehicle_type]
+    off = np.flatnonzero(boundary.are_off_road(poses, Shape.rectangle(known.l, known.w)))
     if len(off):
         failed['boundary_collision'] = f'off the road from time step {off[0]} of the trajectory on'
     if not feasibility.feasible:
@@ -89,10 +89,15 @@ def _check_solution(scenario: Scenario, problem: PlanningProblem,
     return SolutionChecks(failed, tuple(name for name in names if name not in failed))
 
 
-def _shape(found: PlanningProblemSolution) -> Shape:
-    from crgame_ros.analysis.scores.checker import solution_checker
-    known = solution_checker.VehicleParameterMapping.from_vehicle_type(found.vehicle_type)
-    return Shape.rectangle(float(known.l), float(known.w))
+def failures(checks: Mapping[str, Callable[[], object]]) -> dict[str, str]:
+    """Run checks, and return the reasons of those that fail by their names."""
+    failed = {}
+    for name, check in checks.items():
+        try:
+            check()
+        except Exception as error:  # the checker can raise any exception
+            failed[name] = one_line(str(error) or type(error).__name__)
+    return failed
 
 
 @dataclass(frozen=True)

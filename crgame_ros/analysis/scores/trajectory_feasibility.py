@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # Importing the checker takes a second.
 
 FloatArray = NDArray[np.float64]
 
+_INPUTS = (TrajectoryType.Input, TrajectoryType.PMInput)
 # The checker's tolerance is a distance that does not depend on the step: over shorter steps nearly
 # any transition passes [s].
 LEAST_STEP_S = 0.1
@@ -88,9 +89,9 @@ def check_feasibility(found: PlanningProblemSolution, problem: PlanningProblem, 
     :param dt_s: time step [s]
     :param progress: called with the share checked so far, 0 to 1.
     """
+    if found.trajectory_type in _INPUTS:
+        return _check_inputs(found, problem, dt_s)
     dynamics = _dynamics(found)
-    if found.trajectory_type in (TrajectoryType.Input, TrajectoryType.PMInput):
-        return _check_inputs(found, problem, dynamics, dt_s)
     stride = max(1, math.ceil(LEAST_STEP_S / dt_s - 1e-9))
     every = found.trajectory.state_list
     states = every[::stride]
@@ -189,17 +190,15 @@ def _why(position: float, heading: float, acceleration: float, rate: float,
 
 
 def _check_inputs(found: PlanningProblemSolution, problem: PlanningProblem,
-                  dynamics: 'VehicleDynamics', dt_s: float) -> TrajectoryFeasibility:
+                  dt_s: float) -> TrajectoryFeasibility:
     """Check a solution that holds inputs: each input must be within bounds and friction."""
-    from crgame_ros.analysis.scores.checker import feasibility_checker
     try:
-        feasible, made = feasibility_checker.input_vector_feasibility(
-            problem.initial_state, found.trajectory, dynamics, dt_s)
-    except Exception as error:  # the checker can raise any exception
-        return TrajectoryFeasibility(None, None, one_line(f'{type(error).__name__}: {error}'))
+        feasible, made = _driven(found, problem, dt_s)
+    except ValueError as error:
+        return TrajectoryFeasibility(None, None, str(error))
     last = int(made.state_list[-1].time_step)
     return TrajectoryFeasibility(
-        bool(feasible), None if feasible else last,
+        feasible, None if feasible else last,
         '' if feasible else 'its input is beyond the bounds or the friction circle',
         len(found.trajectory.state_list), 0 if feasible else 1, step_s=dt_s)
 
@@ -211,12 +210,18 @@ def simulated(found: PlanningProblemSolution, problem: PlanningProblem,
 
     :raises ValueError: if the model cannot be driven with the inputs.
     """
-    if found.trajectory_type not in (TrajectoryType.Input, TrajectoryType.PMInput):
-        return found.trajectory
+    return _driven(found, problem, dt_s)[1] if found.trajectory_type in _INPUTS \
+        else found.trajectory
+
+
+def _driven(found: PlanningProblemSolution, problem: PlanningProblem,
+            dt_s: float) -> tuple[bool, Trajectory]:
+    """Return whether all inputs of a solution are within bounds, and the states up to there."""
     dynamics = _dynamics(found)
     from crgame_ros.analysis.scores.checker import feasibility_checker
     try:
-        return feasibility_checker.input_vector_feasibility(
-            problem.initial_state, found.trajectory, dynamics, dt_s)[1]
+        feasible, made = feasibility_checker.input_vector_feasibility(
+            problem.initial_state, found.trajectory, dynamics, dt_s)
     except Exception as error:  # the checker can raise any exception
         raise ValueError(one_line(f'{type(error).__name__}: {error}')) from error
+    return bool(feasible), made
