@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores of a run's drives by nuPlan, and the expert: without CommonRoad's checker."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.analysis.scores.nuplan import Expert, NuplanScore, NuplanScorer
-from crgame_ros.analysis.scores.scored_drive import drive_of
+from crgame_ros.analysis.scores.scored_drive import drive_of, ScoredDrive
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.errors import InputError
@@ -34,15 +34,26 @@ def score_drives(log: RunTrajectories, *, expert: Expert | None = None,
     if not log.vehicles:
         raise InputError('it has no driven vehicle', 'the run',
                          'score a run with a human or an AV')
-    run = _Drives(log, expert)
+    original = parse_scenario(log.xml_text, '/scenario/xml')
+    scorer, scored = NuplanScorer(original), ScoredScenario.from_file(original)
+    problems = {problem.planning_problem_id: problem for problem in original.planning_problems}
     vehicles, ends = [], first_ends(log, put_back or {})
     for number, item in enumerate(log.vehicles):
-        av = log.game.av(item.id)
-        nuplan, remarks = run.score(number, ends.get(item.id, log))
+        av, driven = log.game.av(item.id), ends.get(item.id, log)
+        remarks: list[str] = []
+        nuplan = score_drive(
+            scorer, drive_of(driven, number), scored,
+            None if av is None else problems.get(av.planning_problem), int(driven.ks[0]), remarks,
+            expert)
+        if item.id in ends:
+            scheduler = log.game.scheduler
+            end_s = (int(driven.ks[-1]) - scheduler.k0) * scheduler.time_step_s
+            remarks.append(f'scored up to {end_s:.1f} s: {item.id} was then put back on its lane, '
+                           'and this jump was not driven')
         vehicles.append(VehicleScores(
             item.id, 'human' if item.role is Role.HUMAN else 'autonomous',
             '' if av is None else av.planner, nuplan, None, None, (plans or {}).get(item.id),
-            (*remarks, *_ended(item.id, ends.get(item.id)))))
+            tuple(remarks)))
     return tuple(vehicles)
 
 
@@ -52,37 +63,22 @@ def first_ends(log: RunTrajectories,
     return {vehicle: log.until(min(ks)) for vehicle, ks in put_back.items()}
 
 
-def _ended(vehicle_id: str, log: RunTrajectories | None) -> Iterator[str]:
-    """Yield a remark on the time up to which a vehicle that was put back is scored."""
-    if log is not None:
-        scheduler = log.game.scheduler
-        end_s = (int(log.ks[-1]) - scheduler.k0) * scheduler.time_step_s
-        yield (f'scored up to {end_s:.1f} s: {vehicle_id} was then put back on its lane, '
-               'and this jump was not driven')
+def score_drive(scorer: NuplanScorer, drive: ScoredDrive, scored: ScoredScenario,
+                problem: PlanningProblem | None, first_k: int, remarks: list[str],
+                expert: Expert | None = None) -> NuplanScore | None:
+    """
+    Return nuPlan's score of a drive; without a score, add a remark that says why.
 
-
-class _Drives:
-    """The drives of one run, on the roads of its scenario."""
-
-    def __init__(self, log: RunTrajectories, expert: Expert | None) -> None:
-        self._expert = expert
-        original = parse_scenario(log.xml_text, '/scenario/xml')
-        self._nuplan = NuplanScorer(original)
-        self._original = ScoredScenario.from_file(original)
-        self._problems = {problem.planning_problem_id: problem
-                          for problem in original.planning_problems}
-
-    def score(self, number: int, log: RunTrajectories
-              ) -> tuple[NuplanScore | None, tuple[str, ...]]:
-        """Score the vehicle with this number over a log; without a score, remarks say why."""
-        av = log.game.av(log.vehicles[number].id)
-        problem = None if av is None else self._problems.get(av.planning_problem)
-        expert = self._expert or recorded_expert(
-            self._original, problem, int(log.ks[0]), len(log.ks))
-        try:
-            return self._nuplan.score(drive_of(log, number), expert, problem), ()
-        except InputError as error:
-            return None, (f'no nuPlan score: {error}',)
+    :param scored: the scenario that the problem is of.
+    :param first_k: time step at which the drive begins.
+    :param expert: None for the obstacle that the problem replaced, where there is one.
+    """
+    expert = expert or _recorded_expert(scored, problem, first_k, len(drive.poses))
+    try:
+        return scorer.score(drive, expert, problem)
+    except InputError as error:
+        remarks.append(f'no nuPlan score: {error}')
+        return None
 
 
 def expert_of_run(expert: RunTrajectories, log: RunTrajectories, name: str) -> Expert:
@@ -110,8 +106,8 @@ def expert_of_run(expert: RunTrajectories, log: RunTrajectories, name: str) -> E
     return Expert(f'{item.id} of {name}', poses)
 
 
-def recorded_expert(scored: ScoredScenario, problem: PlanningProblem | None,
-                    first_k: int, steps: int) -> Expert | None:
+def _recorded_expert(scored: ScoredScenario, problem: PlanningProblem | None,
+                     first_k: int, steps: int) -> Expert | None:
     """
     Return the recorded obstacle that a planning problem replaced; None where there is none.
 

@@ -14,9 +14,9 @@ from commonroad.common.solution import (
 )
 from commonroad.planning.planning_problem import PlanningProblem, PlanningProblemSet
 from commonroad.scenario.trajectory import Trajectory
-from crgame_ros.analysis.scores.nuplan import NuplanScore, NuplanScorer
+from crgame_ros.analysis.scores.nuplan import NuplanScorer
 from crgame_ros.analysis.scores.scored_drive import drive_among, ScoredDrive, Track
-from crgame_ros.analysis.scores.scored_drives import recorded_expert
+from crgame_ros.analysis.scores.scored_drives import score_drive
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_judge import (
     failures,
@@ -95,8 +95,10 @@ def _score(scored: ScoredScenario, judge: SolutionJudge, nuplan: NuplanScorer, n
         if judged.feasibility.feasible is False and _has_rear_axles(part.found, problem, drive):
             told.append('its positions seem to be those of the rear axle, as in files of 2021: '
                         'read in this way, it is feasible')
+        nuplan_score = score_drive(nuplan, drive, scored, problem,
+                                   int(part.driven.state_list[0].time_step), told)
         result.append(VehicleScores(
-            who, 'solution', '', _score_drive(scored, nuplan, drive, part, told), judged,
+            who, 'solution', '', nuplan_score, judged,
             find_goal(problem, part.driven.state_list, drive.dt_s), None, tuple(told)))
     return result
 
@@ -151,15 +153,3 @@ def _track(other: ScoredDrive, mate: _Part, mine: ScoredDrive, part: _Part) -> T
     poses, speeds = np.full((len(rows), 3), np.nan), np.full(len(rows), np.nan)
     poses[known], speeds[known] = other.poses[rows[known]], np.abs(other.speeds[rows[known]])
     return Track(other.vehicle_id, 'vehicle', other.shape, poses, speeds)
-
-
-def _score_drive(scored: ScoredScenario, nuplan: NuplanScorer, drive: ScoredDrive, part: _Part,
-                 remarks: list[str]) -> NuplanScore | None:
-    problem = scored.problem(part.found.planning_problem_id)
-    expert = recorded_expert(scored, problem, int(part.driven.state_list[0].time_step),
-                             len(drive.poses))
-    try:
-        return nuplan.score(drive, expert, problem)
-    except InputError as error:
-        remarks.append(f'no nuPlan score: {error}')
-        return None
