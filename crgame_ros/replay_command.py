@@ -59,7 +59,7 @@ def replay(values: argparse.Namespace) -> int:
     """Replay against every planner, write the runs and print the comparison."""
     from crgame_ros.analysis.criticality.recorded import measure_log
     from crgame_ros.analysis.outcome_line import tell_outcome
-    from crgame_ros.analysis.scores.run_scores import scores_of
+    from crgame_ros.analysis.scores.scored_run import scores_of
     from crgame_ros.planner.registry import planner_class
     from crgame_ros.recording.run_folder import recording_in
     from crgame_ros.recording.run_trajectories import read_trajectories

@@ -70,7 +70,7 @@ class Run(MeasuredRun):
     @cached_property
     def drive_scores(self) -> 'tuple[VehicleScores, ...]':
         """Score its drives without CommonRoad's tools; empty where they cannot be scored."""
-        from crgame_ros.analysis.scores.run_scores import scores_of
+        from crgame_ros.analysis.scores.scored_run import scores_of
         return scores_of(self.record, {}, drives_only=True).vehicles
 
     def criticality(self, thresholds: Thresholds = USUAL) -> 'dict[str, VehicleCriticality]':

@@ -13,7 +13,7 @@ from typing import Any
 
 from browser_support import Browser
 import commonroad
-from crgame_ros.analysis.scores.run_scores import scores_of
+from crgame_ros.analysis.scores.scored_run import scores_of
 from crgame_ros.game.game import load_game
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import run_folders

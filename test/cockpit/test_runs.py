@@ -15,7 +15,7 @@ import zipfile
 
 from aiohttp import ClientSession, CookieJar, WSMsgType
 from cockpit_support import HOST, in_loop, PATIENCE_S, PumpBackend
-from crgame_ros.analysis.scores.run_scores import scores_of
+from crgame_ros.analysis.scores.scored_run import scores_of
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.runs import routes
 from crgame_ros.cockpit.runs.archive import PastRun, run_id, RunArchive

@@ -38,7 +38,7 @@ if TYPE_CHECKING:  # They take a second to import, and only measures need them.
     from crgame_ros.analysis.pictures.scene_frame import FrameScene
     from crgame_ros.analysis.pictures.timing_figure import TimedRun
     from crgame_ros.analysis.rules.vehicle_rules import VehicleRules
-    from crgame_ros.analysis.scores.run_scores import RunScores
+    from crgame_ros.analysis.scores.scored_run import RunScores
 
 FloatArray = NDArray[np.float64]
 # Called with a piece of work, as in `reading runs/NAME`, and the share done of it, 0 to 1.
@@ -304,7 +304,7 @@ class Run:
     @cached_property
     def usual_scores(self) -> 'RunScores':
         """Score its vehicles, with their own progress as the measure."""
-        from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
+        from crgame_ros.analysis.scores.scored_run import RunScores, scores_of
         if self.scoring == 'none' or not self.vehicles:
             return RunScores()
         return scores_of(self.record, self.answers, drives_only=self.scoring == 'drives',

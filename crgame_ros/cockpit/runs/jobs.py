@@ -11,7 +11,7 @@ from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.analysis.report.file import write_report
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.scores.nuplan import NuplanScore, WEIGHTS
-from crgame_ros.analysis.scores.run_scores import scores_of
+from crgame_ros.analysis.scores.scored_run import scores_of
 from crgame_ros.analysis.scores.vehicle import SCORE_MEASURES
 from crgame_ros.cockpit.job_process import serve_jobs
 from crgame_ros.recording.run_record import read_run_record, RunRecord

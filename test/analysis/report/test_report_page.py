@@ -17,7 +17,7 @@ from crgame_ros.analysis.report.driving_section import driving_section
 from crgame_ros.analysis.report.file import report_html
 from crgame_ros.analysis.report.planners_section import planners_section
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
+from crgame_ros.analysis.scores.scored_run import RunScores, scores_of
 from crgame_ros.analysis.scores.vehicle import SCORE_MEASURES as MEASURES_OF_SCORES
 import numpy as np
 from page_reader import Page
