@@ -38,67 +38,6 @@ from crgame_ros.timing.late_steps import LATE_KEYS
 from crgame_ros.variation.space import space_of
 from crgame_ros.yaml_text import read_text, read_yaml
 
-_FILES, _WORDS = 'files', re.compile(r'words\..*\.yaml')
-# A journal has a line for each entry, and answers can be long [bytes].
-_LONGEST_JOURNAL = 200_000_000
-
-
-def is_study(path: Path) -> bool:
-    """Return whether a folder is that of a study with participants."""
-    return (path / STUDY_FILE).is_file()
-
-
-def study_parts(path: Path) -> list[Path]:
-    """Return the files to check: study, questionnaires, journals, games, runs, tables."""
-    return list(_parts(path))
-
-
-def _parts(path: Path) -> Iterator[Path]:
-    study = (path / STUDY_FILE).parent
-    # Games may refer to any file; only scenarios among these can be checked by themselves.
-    yield from sorted(file for file in study.rglob('*.yaml') if not _WORDS.fullmatch(file.name)
-                      and study / _FILES not in file.parents)
-    yield from sorted((study / _FILES).rglob('*.xml'))
-    for person in sorted((path / PARTICIPANTS).glob('*/')):
-        yield from sorted(person.glob('*.jsonl'))
-        yield from sorted((person / 'games').glob('*.yaml'))
-        for session in sorted((person / 'runs').glob('*/')):
-            for run in run_folders(session):
-                yield from bags_of(run)
-                yield from _files_of_run(run)
-    yield from sorted(file.parent for file in (path / 'data').rglob(PACKAGE_FILE)
-                      if not (file.parent / 'evaluation.json').exists())
-
-
-def journal_faults(path: Path) -> tuple[int, list[str]]:
-    """
-    Check a journal: each whole line is an entry with its time; the first begins the session.
-
-    :return: the number of entries, and the faults, one line each.
-    :raises InputError: if it cannot be read.
-    """
-    text = read_text(path, 'journal', max_bytes=_LONGEST_JOURNAL)
-    faults, count = [], 0
-    lines = text.split('\n')
-    if lines.pop():
-        faults.append(f'{path}: its last line was cut off; the next start of the session drops it')
-    for number, line in enumerate(lines, 1):
-        try:
-            entry = json.loads(line)
-            kind, at = entry['entry'], entry['at']
-            if not isinstance(kind, str) or not math.isfinite(at):
-                raise ValueError('entry or time')
-        except (ValueError, LookupError, TypeError, OverflowError, RecursionError):
-            faults.append(f'{path}: line {number} is no entry with its time')
-            continue
-        count += 1
-        if (number == 1) != (kind == 'begun'):
-            faults.append(f'{path}: line {number}: a session begins once, in the first line')
-    if not count:
-        raise InputError('holds no entry', str(path), 'name the journal of a participant')
-    return count, faults
-
-
 Progress = Callable[[float], object]
 # Folder of a run's tables, within that of the run.
 TABLES = 'tables'
@@ -107,6 +46,9 @@ _SHOWN = 20
 # The root element of an XML file is searched for in so many characters.
 _HEAD = 10_000
 _SOLUTION = re.compile('<CommonRoadSolution[ >]')
+_FILES, _WORDS = 'files', re.compile(r'words\..*\.yaml')
+# A journal has a line for each entry, and answers can be long [bytes].
+_LONGEST_JOURNAL = 200_000_000
 
 
 @dataclass(frozen=True)
@@ -124,6 +66,9 @@ class FileVerdict:
     remarks: tuple[str, ...] = ()
 
 
+_Check = Callable[[Path, Progress | None], FileVerdict]
+
+
 def validate(path: Path, progress: Progress | None = None) -> FileVerdict:
     """
     Check a file, or the folder of a recording, a run or tables.
@@ -133,21 +78,39 @@ def validate(path: Path, progress: Progress | None = None) -> FileVerdict:
     """
     if not path.exists():
         raise InputError('no such file or folder', str(path), 'check the name')
-    check = _check_of(path)
+    name, check = _check_of(path)
     try:
         return check(path, progress)
     except CrgameError as error:
-        return FileVerdict(_name_of(path), (str(error),))
+        return FileVerdict(name, (str(error),))
 
 
 def parts_of(path: Path) -> list[Path]:
     """Return the files to check at a path: for the folder of a run or study, all its files."""
-    if is_study(path):
-        return study_parts(path)
+    if (path / STUDY_FILE).is_file():
+        return list(_parts_of_study(path))
     if not path.is_dir() or recording_in(path) == path:
         return [path]
     tables = [path / TABLES] if (path / TABLES / PACKAGE_FILE).exists() else []
     return [recording_in(path), *tables, *_files_of_run(path)]
+
+
+def _parts_of_study(path: Path) -> Iterator[Path]:
+    """Yield study, questionnaires, journals, games, runs and tables."""
+    study = (path / STUDY_FILE).parent
+    # Games may refer to any file; only scenarios among these can be checked by themselves.
+    yield from sorted(file for file in study.rglob('*.yaml') if not _WORDS.fullmatch(file.name)
+                      and study / _FILES not in file.parents)
+    yield from sorted((study / _FILES).rglob('*.xml'))
+    for person in sorted((path / PARTICIPANTS).glob('*/')):
+        yield from sorted(person.glob('*.jsonl'))
+        yield from sorted((person / 'games').glob('*.yaml'))
+        for session in sorted((person / 'runs').glob('*/')):
+            for run in run_folders(session):
+                yield from bags_of(run)
+                yield from _files_of_run(run)
+    yield from sorted(file.parent for file in (path / 'data').rglob(PACKAGE_FILE)
+                      if not (file.parent / 'evaluation.json').exists())
 
 
 def _files_of_run(folder: Path) -> list[Path]:
@@ -156,29 +119,26 @@ def _files_of_run(folder: Path) -> list[Path]:
                   or file.match('timing*.json'))
 
 
-def _check_of(path: Path) -> Callable[[Path, Progress | None], FileVerdict]:
+def _check_of(path: Path) -> tuple[str, _Check]:
+    """Return the name of a file's kind, and how it is checked."""
     if path.is_dir():
         if (path / PACKAGE_FILE).exists():
-            return _tables
+            return 'recording', _tables
         bag = recording_in(path)
         if (bag / METADATA_FILE).exists() or any(
                 file.suffix in _RECORDINGS for file in bag.iterdir()):
-            return _recording
+            return 'recording', _recording
         raise InputError('holds neither a recording nor tables', str(path),
                          'name a file, or the folder of a run, of a recording or of tables')
-    known = {'.xml': _scenario, '.json': _timing, '.yaml': _yaml, '.yml': _yaml,
-             '.jsonl': _journal,
-             **dict.fromkeys(_RECORDINGS, _recording)}
+    known: dict[str, tuple[str, _Check]] = {
+        '.xml': ('XML file', _scenario), '.json': ('JSON file', _timing),
+        '.yaml': ('YAML file', _yaml), '.yml': ('YAML file', _yaml),
+        '.jsonl': ('journal of a session', _journal),
+        **dict.fromkeys(_RECORDINGS, ('recording', _recording))}
     if path.suffix.lower() not in known:
         raise InputError(f'no kind of file is known by "{path.suffix}"', str(path),
                          'name one of .xml, .yaml, .json, .jsonl, .mcap or .db3')
     return known[path.suffix.lower()]
-
-
-def _name_of(path: Path) -> str:
-    names = {'.xml': 'XML file', '.yaml': 'YAML file', '.yml': 'YAML file', '.json': 'JSON file',
-             '.jsonl': 'journal of a session'}
-    return names.get(path.suffix.lower(), 'recording')
 
 
 def _scenario(path: Path, _progress: Progress | None) -> FileVerdict:
@@ -205,7 +165,7 @@ def _scenario(path: Path, _progress: Progress | None) -> FileVerdict:
 
 def _solution(path: Path, _progress: Progress | None) -> FileVerdict:
     """Check a solution by its schema, and by reading it."""
-    # Imported here because it loads the drivability checker.
+    # Imported here because it reads the files of four vehicles.
     from crgame_ros.analysis.scores.solution_file import read_solution, ROOT
     source = str(path)
     root = guard.parse_hardened(guard.read_text(path), source, ROOT)
@@ -225,8 +185,26 @@ def _tables(path: Path, _progress: Progress | None) -> FileVerdict:
 
 
 def _journal(path: Path, _progress: Progress | None) -> FileVerdict:
-    """Check the journal of a participant's session."""
-    count, faults = journal_faults(path)
+    """Check that each whole line is an entry with its time; the first begins the session."""
+    text = read_text(path, 'journal', max_bytes=_LONGEST_JOURNAL)
+    faults, count = [], 0
+    lines = text.split('\n')
+    if lines.pop():
+        faults.append(f'{path}: its last line was cut off; the next start of the session drops it')
+    for number, line in enumerate(lines, 1):
+        try:
+            entry = json.loads(line)
+            kind, at = entry['entry'], entry['at']
+            if not isinstance(kind, str) or not math.isfinite(at):
+                raise ValueError('entry or time')
+        except (ValueError, LookupError, TypeError, OverflowError, RecursionError):
+            faults.append(f'{path}: line {number} is no entry with its time')
+            continue
+        count += 1
+        if (number == 1) != (kind == 'begun'):
+            faults.append(f'{path}: line {number}: a session begins once, in the first line')
+    if not count:
+        raise InputError('holds no entry', str(path), 'name the journal of a participant')
     return FileVerdict(f'journal of a session of {count} entries', tuple(faults[:_SHOWN]))
 
 

@@ -13,7 +13,7 @@ from crgame_ros.paths import scenarios_directory, share_directory
 from crgame_ros.recording.finish import finish_run
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
-from crgame_ros.verdict.validation import journal_faults
+from crgame_ros.verdict.validation import FileVerdict, validate
 import pytest
 
 
@@ -171,7 +171,8 @@ def test_solutions_are_checked_by_their_schema(run: Path, tmp_path: Path,
 def test_a_number_of_400_digits_is_no_time(tmp_path: Path) -> None:
     journal = tmp_path / 'journal.jsonl'
     journal.write_text('{"entry": "begun", "at": 1}\n{"entry": "x", "at": 1' + 400 * '0' + '}\n')
-    assert journal_faults(journal) == (1, [f'{journal}: line 2 is no entry with its time'])
+    assert validate(journal) == FileVerdict(
+        'journal of a session of 1 entries', (f'{journal}: line 2 is no entry with its time',))
 
 
 @pytest.mark.parametrize(('name', 'content', 'words'), [
