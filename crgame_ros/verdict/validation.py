@@ -123,7 +123,7 @@ def _check_of(path: Path) -> tuple[str, _Check]:
     """Return the name of a file's kind, and how it is checked."""
     if path.is_dir():
         if (path / PACKAGE_FILE).exists():
-            return 'recording', _tables
+            return 'tables', _tables
         bag = recording_in(path)
         if (bag / METADATA_FILE).exists() or any(
                 file.suffix in _RECORDINGS for file in bag.iterdir()):

@@ -151,7 +151,9 @@ def test_tables_are_checked_by_their_dictionary(run: Path, tmp_path: Path,
     assert 'other columns or types than the dictionary: time_s' in _told(
         tmp_path / 'parquet', capsys)[2]
     package.write_text('{"resources": [{"path": "../a"}]}')
-    assert 'no data dictionary of ours' in _told(tmp_path / 'parquet', capsys)[2]
+    code, said, err = _told(tmp_path / 'parquet', capsys)
+    assert (code, said) == (2, f'{tmp_path / "parquet"}: tables, not valid\n')
+    assert 'no data dictionary of ours' in err
 
 
 def test_solutions_are_checked_by_their_schema(run: Path, tmp_path: Path,
