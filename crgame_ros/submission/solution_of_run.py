@@ -15,7 +15,6 @@ from commonroad.common.solution import (
     SupportedCostFunctions,
     VehicleModel,
 )
-from commonroad.scenario.scenario import ScenarioID
 from commonroad.scenario.state import KSState
 from crgame_ros.analysis.scores.driven_states import (
     choose_type,
@@ -35,7 +34,6 @@ from crgame_ros.scenario.export_network import solution_schema_errors
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
 import numpy as np
 
-MODELS = ('KS', 'PM')
 # In the ids of scenarios whose traffic the benchmark's server simulates.
 _INTERACTIVE = 'I'
 
@@ -108,33 +106,28 @@ def judged_run(log: RunTrajectories, choice: BenchmarkChoice,
     if not parts:
         raise InputError('no AV of it has a planning problem', str(scenario_id),
                          'give a run with one')
-    solution = dated(Solution(scenario_id, [part.solved for part in parts]), when)
+    solution = dated(Solution(scenario_id, [solved for solved, _ in parts]), when)
     text = solution_text(solution)
     scores = judge_solution(ScoredScenario(loaded), solution)
-    faults = [*_schema_faults(text), *_faults(scores)]
-    if _is_interactive(scenario_id):
+    root = guard.parse_hardened(text, 'solution', ROOT)
+    faults = [*(f'schema: {error}' for error in solution_schema_errors(root)), *_faults(scores)]
+    if scenario_id.obstacle_behavior == _INTERACTIVE:
         faults.insert(0, "interactive: the benchmark's server simulates other traffic than the "
                       'one in the file')
-    remarks = [part.remark for part in parts if part.remark]
+    remarks = [remark for _, remark in parts if remark]
     if any('obstacle_collision' in score.checks.failed for score in scores):
         remarks += _own_obstacles(loaded, solution.planning_problem_ids)
     totals = [score.costs[0].total for score in scores]
     return JudgedSolution(
         str(scenario_id), solution.benchmark_id,
-        sum(len(part.solved.trajectory.state_list) for part in parts),
+        sum(len(solved.trajectory.state_list) for solved, _ in parts),
         None if None in totals else sum(total for total in totals if total is not None),
         tuple(dict.fromkeys(faults)), tuple(remarks), text)
 
 
-class _Part(NamedTuple):
-
-    solved: PlanningProblemSolution
-    remark: str
-
-
 def _parts(log: RunTrajectories, loaded: LoadedScenario,
-           choice: BenchmarkChoice) -> Iterator[_Part]:
-    """Yield the solution of each planning problem that an AV has."""
+           choice: BenchmarkChoice) -> Iterator[tuple[PlanningProblemSolution, str]]:
+    """Yield the solution of each planning problem that an AV has, with a note or an empty text."""
     problems = {problem.planning_problem_id: problem for problem in loaded.planning_problems}
     numbers = {vehicle.id: number for number, vehicle in enumerate(log.vehicles)}
     for av in log.game.avs:
@@ -150,7 +143,7 @@ def _parts(log: RunTrajectories, loaded: LoadedScenario,
         modelled = states if choice.model == VehicleModel.KS.name \
             else point_mass_states(states, kind.kind)
         kept = until_goal(modelled, goal_step(problem, modelled))
-        yield _Part(
+        yield (
             PlanningProblemSolution(av.planning_problem, VehicleModel[choice.model], kind.kind,
                                     CostFunction[choice.cost], kept),
             '' if kind.is_exact else
@@ -180,15 +173,6 @@ def _own_obstacles(loaded: LoadedScenario, problems: Collection[int]) -> Iterato
         if problem in problems:
             yield (f'obstacle {obstacle} of the file starts where planning problem {problem} '
                    'does: every solution collides with it')
-
-
-def _is_interactive(scenario_id: ScenarioID) -> bool:
-    return bool(scenario_id.obstacle_behavior == _INTERACTIVE)
-
-
-def _schema_faults(text: str) -> list[str]:
-    root = guard.parse_hardened(text, 'solution', ROOT)
-    return [f'schema: {error}' for error in solution_schema_errors(root)]
 
 
 def _faults(scores: list[SolutionScores]) -> Iterator[str]:

@@ -3,7 +3,7 @@
 """The solutions of many runs: which go into the archive, and why the others do not."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import gc
 import io
 from pathlib import Path
@@ -83,7 +83,7 @@ def _judged(drive: Drive, choice: BenchmarkChoice) -> Candidate:
         found = judged_run(run.log, choice, run.when)
     except CrgameError as error:
         return Candidate(drive.name, drive.scenario, None, one_line(str(error)))
-    return Candidate(drive.name, found.scenario_id, found, found.faults[0] if found.faults else '',
+    return Candidate(drive.name, found.scenario_id, found, next(iter(found.faults), ''),
                      (*found.remarks, *run.remarks))
 
 
@@ -91,8 +91,7 @@ def _compared(found: Candidate, best: dict[str, JudgedSolution]) -> Candidate:
     solution = found.solution
     if solution is None or not solution.is_valid or best[solution.benchmark_id] is solution:
         return found
-    return Candidate(found.name, found.scenario, solution,
-                     'valid, but another run solves it at no more cost', found.remarks)
+    return replace(found, fault='valid, but another run solves it at no more cost')
 
 
 def _cost(found: JudgedSolution) -> float:
