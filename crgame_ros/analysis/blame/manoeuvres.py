@@ -66,26 +66,18 @@ MANOEUVRES = (*BRAKING, *(
 @dataclass(frozen=True)
 class Capability:
     """
-    The limits of a vehicle.
+    What a vehicle can do.
 
+    :param vehicle: its other limits.
     :param grip: greatest acceleration of its tyres in any direction [m/s^2]
     :param braking: greatest deceleration [m/s^2]
     :param acceleration: greatest acceleration at low speed [m/s^2]
-    :param switching_speed: above it, power limits acceleration [m/s]
-    :param max_speed: [m/s]
-    :param wheelbase: [m]
-    :param max_steering_angle: [rad]
-    :param max_steering_rate: [rad/s]
     """
 
+    vehicle: VehicleParameters
     grip: float
     braking: float
     acceleration: float
-    switching_speed: float
-    max_speed: float
-    wheelbase: float
-    max_steering_angle: float
-    max_steering_rate: float
 
     @classmethod
     def of(cls, vehicle: VehicleParameters) -> 'Capability':
@@ -93,8 +85,7 @@ class Capability:
         most = vehicle.max_acceleration
         grip = vehicle.friction * vehicle.gravity or most
         braking = min(vehicle.max_brake_force / vehicle.mass or most, grip, most)
-        return cls(grip, braking, min(most, grip), vehicle.switching_speed, vehicle.max_speed,
-                   vehicle.wheelbase, vehicle.max_steering_angle, vehicle.max_steering_rate)
+        return cls(vehicle, grip, braking, min(most, grip))
 
 
 class Path:
@@ -142,16 +133,17 @@ def drive(manoeuvres: tuple[Manoeuvre, ...], state: FloatArray, path: Path, able
     :return: (M, T, 3) poses of the rear axle.
     """
     along, aside, share, straight = (np.array(column) for column in zip(*manoeuvres, strict=True))
+    vehicle, wheelbase = able.vehicle, able.vehicle.wheelbase
     direction = -1.0 if state[StateColumn.SPEED] < 0.0 else 1.0
     x, y, yaw, speed, steering = (np.full(len(along), value) for value in state[:5].tolist())
     # Along the path, forwards or in reverse.
     speed, begin, way = np.abs(speed), yaw, np.zeros(len(along))
-    curvature = np.tan(steering) / able.wheelbase
+    curvature = np.tan(steering) / wheelbase
     far, gone, moving = np.abs(aside), np.zeros(len(along)), aside != 0.0
     # In reverse, the heading turns to the right to go to the left.
     lateral = direction * share * able.grip * np.sign(aside)
     back = np.maximum(share, _BACK) * able.grip
-    tightest = math.tan(able.max_steering_angle) / able.wheelbase
+    tightest = math.tan(vehicle.max_steering_angle) / wheelbase
     poses = np.empty((len(along), count, 3))
     poses[:, 0] = joined(x, y, yaw)
     heading = path.yaw(way)
@@ -159,7 +151,7 @@ def drive(manoeuvres: tuple[Manoeuvre, ...], state: FloatArray, path: Path, able
         pace = np.maximum(speed, CRAWL)
         square = pace * pace
         # What the wheels turn in a second [1/m/s]
-        rate = able.max_steering_rate * (1.0 + (able.wheelbase * curvature) ** 2) / able.wheelbase
+        rate = vehicle.max_steering_rate * (1.0 + (wheelbase * curvature) ** 2) / wheelbase
         # Where the path turns, and how the vehicle is turned relative to it.
         onward = path.yaw(way + pace * dt_s)
         bend = np.where(straight, 0.0, onward - heading) / (pace * dt_s)
@@ -175,10 +167,10 @@ def drive(manoeuvres: tuple[Manoeuvre, ...], state: FloatArray, path: Path, able
         curvature = _limited(curvature + _limited(wanted - curvature, rate * dt_s), limit)
         # What is left of the friction circle.
         left = np.sqrt(np.maximum(able.grip ** 2 - (speed * speed * curvature) ** 2, 0.0))
-        pull = able.acceleration * np.minimum(1.0, able.switching_speed / pace)
+        pull = able.acceleration * np.minimum(1.0, vehicle.switching_speed / pace)
         acceleration = _limited(along * np.where(along < 0.0, able.braking, pull), left)
         after = np.minimum(np.maximum(speed + acceleration * dt_s, 0.0),
-                           np.maximum(able.max_speed, speed))
+                           np.maximum(vehicle.max_speed, speed))
         moved = 0.5 * (speed + after) * dt_s
         turned = direction * moved * curvature
         middle = yaw + 0.5 * turned
