@@ -256,8 +256,7 @@ def _measured(everybody: _Everybody, number: int, limits: ResponseLimits,
     keeping = keep_lane(everybody.roads, states, vehicle, everybody.step_s,
                         record.jumps(number))
     dt_s = game.scheduler.dt_s
-    controls = DriverControls.from_commands(record.times_s, record.commands[:, number],
-                                            vehicle.max_steering_wheel_angle, dt_s)
+    controls = DriverControls.of_vehicle(record, number)
     human = game.human(vehicle_id) is not None
     return DriverBehaviour(
         vehicle_id, human, controls.driven_s,

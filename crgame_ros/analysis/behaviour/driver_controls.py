@@ -13,6 +13,7 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.filters import low_passed, PADDING
+from crgame_ros.recording.run_record import RunRecord
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,6 +57,14 @@ class DriverControls:
         known = np.isfinite(commands[:, :3]).all(axis=1)
         throttle, brake, steering = commands[known, :3].T
         return cls(times_s[known], throttle, brake, math.degrees(max_wheel_angle) * steering, dt_s)
+
+    @classmethod
+    def of_vehicle(cls, record: RunRecord, number: int) -> 'DriverControls':
+        """Build the controls of a driven vehicle of a run, by its number."""
+        game = record.log.game
+        return cls.from_commands(
+            record.times_s, record.commands[:, number],
+            game.vehicles[number].vehicle.max_steering_wheel_angle, game.scheduler.dt_s)
 
     def pieces(self) -> Iterator[slice]:
         """Yield the pieces in which the driver drove without a gap."""

@@ -116,18 +116,6 @@ def _or_inf(seconds: float) -> float:
     return math.inf if math.isnan(seconds) else seconds
 
 
-def controls_of(run: RunRecord, vehicle_id: str) -> DriverControls | None:
-    """Return the commands that a driven vehicle obeyed; None if it is not in the run."""
-    ids = [item.id for item in run.log.vehicles]
-    if vehicle_id not in ids:
-        return None
-    number = ids.index(vehicle_id)
-    game = run.log.game
-    return DriverControls.from_commands(
-        run.times_s, run.commands[:, number],
-        game.vehicles[number].vehicle.max_steering_wheel_angle, game.scheduler.dt_s)
-
-
 def first_input(run: RunRecord, vehicle_id: str, request_s: float) -> float:
     """
     Return the time from a request to the first input with hands or pedals.
@@ -138,9 +126,10 @@ def first_input(run: RunRecord, vehicle_id: str, request_s: float) -> float:
 
     :return: NaN without one [s]
     """
-    controls = controls_of(run, vehicle_id)
-    if controls is None:
+    ids = [item.id for item in run.log.vehicles]
+    if vehicle_id not in ids:
         return math.nan
+    controls = DriverControls.of_vehicle(run, ids.index(vehicle_id))
     if run.log.game.human(vehicle_id) is None:
         return hands_on_after(controls, request_s)
     times_s = [each for each in reaction_to(request_s, controls) if not math.isnan(each)]
