@@ -6,7 +6,7 @@ Measures how each driven vehicle of a run was driven, and says it in lines of te
 `MEASURES` defines each measure; `docs/behaviour.md` explains them.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 import math
 
@@ -42,7 +42,7 @@ from crgame_ros.analysis.behaviour.reactions import (
 from crgame_ros.analysis.behaviour.task_events import DetectionScore
 from crgame_ros.finite_json import finite
 from crgame_ros.game.documents import GameDocument
-from crgame_ros.game.events import FiredEvent, SpeedLimit
+from crgame_ros.game.events import SpeedLimit
 from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.recording.run_record import RunRecord
@@ -140,37 +140,6 @@ class DriverBehaviour:
             'response_limits': self.limits._asdict(),
             'lane_changes': [finite(each.values()) for each in self.lane_changes],
             'take_overs': [finite(each.values()) for each in self.take_overs]}
-
-
-def limits_of(roads: RoadNetwork, visits: Sequence[LaneVisit], count: int,
-              events: Sequence[tuple[int, SpeedLimit]]) -> FloatArray:
-    """
-    Return the speed limit at each step: NaN off the lanes and where there is none [m/s].
-
-    :param visits: stays in lanelets.
-    :param count: number of steps K.
-    :param events: limits set by events, each with its first step, in order.
-    """
-    limits = np.full(count, np.nan)
-    for visit in visits:
-        signed = roads.speed_limit(visit.lanelet)
-        limits[visit.first:visit.end] = math.nan if signed is None else signed
-        for step, event in events:
-            if not event.lanelets or visit.lanelet in event.lanelets:
-                limits[max(visit.first, step):visit.end] = event.speed
-    return limits
-
-
-def limit_events(game: GameDocument, fired: Sequence[FiredEvent],
-                 first_k: int) -> list[tuple[int, SpeedLimit]]:
-    """Return the limits set by events, with the step since `first_k` at which they took effect."""
-    actions: Mapping[str, object] = {event.name: event.action for event in game.events}
-    found = []
-    for event in fired:
-        action = actions.get(event.name)
-        if isinstance(action, SpeedLimit):
-            found.append((event.k - first_k, action))
-    return found
 
 
 def time_above(speed: FloatArray, limits: FloatArray, step_s: float) -> float:
@@ -274,9 +243,7 @@ def _measured(everybody: _Everybody, number: int, limits: ResponseLimits,
 
 def _motion(everybody: _Everybody, states: FloatArray, keeping: LaneKeeping) -> dict[str, float]:
     speed, acceleration = states[:, StateColumn.SPEED], states[:, StateColumn.ACCELERATION]
-    log = everybody.record.log
-    limits = limits_of(everybody.roads, keeping.visits, len(states), limit_events(
-        log.game, everybody.record.fired, int(log.ks[0])))
+    limits = _limits(everybody, keeping.visits, len(states))
     kept = keeping.kept
     return {
         **_named('speed', spread_of(speed)), **_named('acceleration', spread_of(acceleration)),
@@ -288,6 +255,28 @@ def _motion(everybody: _Everybody, states: FloatArray, keeping: LaneKeeping) -> 
         'lane_changes': float(len(keeping.changes)),
         'tlc_min': float(keeping.tlc_s[kept].min(initial=math.inf)),
         'tlc_linear_min': float(keeping.linear_s[kept].min(initial=math.inf))}
+
+
+def _limits(everybody: _Everybody, visits: Sequence[LaneVisit], count: int) -> FloatArray:
+    """
+    Return the limits (K) of signs and events: NaN off the lanes and where there is none [m/s].
+
+    :param visits: stays in lanelets.
+    :param count: number of steps K.
+    """
+    log, fired = everybody.record.log, everybody.record.fired
+    actions = {event.name: event.action for event in log.game.events
+               if isinstance(event.action, SpeedLimit)}
+    events = [(event.k - int(log.ks[0]), actions[event.name]) for event in fired
+              if event.name in actions]
+    limits = np.full(count, np.nan)
+    for visit in visits:
+        signed = everybody.roads.speed_limit(visit.lanelet)
+        limits[visit.first:visit.end] = math.nan if signed is None else signed
+        for step, event in events:
+            if not event.lanelets or visit.lanelet in event.lanelets:
+                limits[max(visit.first, step):visit.end] = event.speed
+    return limits
 
 
 def _commands(controls: DriverControls) -> dict[str, float]:
