@@ -75,6 +75,8 @@ class DrivabilityMonitor:
     :param occupancy: the map of permanent obstacles, if there is one; touching one is a collision.
     :param transforms: (V) from simulation to the scenario coordinates in which each is checked
         against the road (`road_transforms`); empty for the identity.
+    :ivar verdicts: on the state that was observed last; none before the first.
+    :ivar changed: those of them that differ from the previous ones (`changes`).
     """
 
     def __init__(self, driven: Sequence[ObjectDescription], others: Sequence[ObjectDescription],
@@ -93,24 +95,14 @@ class DrivabilityMonitor:
             if spec.collision and occupancy is not None else None
         self._road = RoadBoundary(lanelet_network) \
             if spec.road and lanelet_network is not None else None
-        self._verdicts: tuple[VehicleDrivability, ...] = ()
-        self._changed: tuple[VehicleDrivability, ...] = ()
+        self.verdicts: tuple[VehicleDrivability, ...] = ()
+        self.changed: tuple[VehicleDrivability, ...] = ()
         self._violations: list[VehicleDrivability] = []
-
-    @property
-    def verdicts(self) -> tuple[VehicleDrivability, ...]:
-        """Return all verdicts on the state that was observed last; none before the first."""
-        return self._verdicts
-
-    @property
-    def changed(self) -> tuple[VehicleDrivability, ...]:
-        """Return the verdicts that differ from the previous ones (`changes`)."""
-        return self._changed
 
     @property
     def stop(self) -> VehicleDrivability | None:
         """Return the violation in the state observed last that ends the run, if there is one."""
-        return next((item for item in self._verdicts if item.stop_requested), None)
+        return next((item for item in self.verdicts if item.stop_requested), None)
 
     def prepare(self, vehicle_states: NDArray[np.float64]) -> None:
         """
@@ -131,9 +123,9 @@ class DrivabilityMonitor:
         """Check a published state (`RunObserver`)."""
         if objects is not None:
             self.set_objects(objects)
-        before, self._verdicts = self._verdicts, self.check(n, since_tick_s, vehicle_states)
-        self._changed = changes(before, self._verdicts)
-        self._violations.extend(self._changed)
+        before, self.verdicts = self.verdicts, self.check(n, since_tick_s, vehicle_states)
+        self.changed = changes(before, self.verdicts)
+        self._violations.extend(self.changed)
 
     def report(self) -> tuple[VehicleDrivability, ...]:
         """Return all changed verdicts so far, in order."""
