@@ -109,15 +109,6 @@ class RoadBoundary:
                 return _is_off(tile, footprint, x, y, yaw)
         return not shapely.contains(self._surface, footprint.polygon(x, y, yaw))
 
-    def contains(self, x_center: float, y_center: float, yaw: float, shape: Shape) -> bool:
-        """
-        Return whether a footprint lies within the united lanelets, an independent check.
-
-        Parameters as in `is_off_road`.
-        """
-        x, y = x_center - self._origin[0], y_center - self._origin[1]
-        return bool(shapely.contains(self._surface, self._footprint(shape).polygon(x, y, yaw)))
-
     def are_off_road(self, poses: NDArray[np.float64], shape: Shape) -> NDArray[np.bool_]:
         """
         Return for many footprints whether any part is off the road, in 2 microseconds each.

@@ -71,7 +71,7 @@ def check_free(plans: list[Plan], road: support.Scenario, cars: tuple[Car, ...],
         x, y, yaw = plan.states[0, :3]
         center = (x + vehicle.rear_to_center * np.cos(yaw), y + vehicle.rear_to_center
                   * np.sin(yaw))
-        assert boundary.contains(*center, yaw, shape), k
+        assert not boundary.are_off_road(np.array([(*center, yaw)]), shape).any(), k
         ego = pycrcc.RectOBB(0.5 * vehicle.length, 0.5 * vehicle.width, yaw, *center)
         for car_x, car_y, heading, speed in cars:
             now = car_x + 0.1 * k * speed * np.cos(heading)
