@@ -29,6 +29,7 @@ from crgame_ros.analysis.criticality.headways import Following, Headways
 from crgame_ros.analysis.criticality.nearby_footprints import NearbyFootprints, Scene
 from crgame_ros.analysis.criticality.own_path import OwnPaths
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
+from crgame_ros.finite_json import finite
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.reference_point import (
@@ -160,16 +161,12 @@ class Exposure(NamedTuple):
                              definition=self.definition.format(**numbers))
 
 
-def _while(holds: bool) -> float:
-    return 1.0 if holds else 0.0
-
-
 _IN_FULL = 'each step that it is below counts in full'
 # By the name of their column.
 EXPOSURES = {
     'tet_s': Exposure(
         's', 'Time with a TTC below {ttc_s} s (TET)', 'time with a ttc below {ttc_s} s', _IN_FULL,
-        lambda values, limits: _while(values[COLUMN['ttc']] < limits.ttc_s)),
+        lambda values, limits: float(values[COLUMN['ttc']] < limits.ttc_s)),
     'tit': Exposure(
         's^2', 'Integral of the TTC below {ttc_s} s (TIT)',
         'integral of what the ttc is below {ttc_s} s', 'rectangles of a scenario step',
@@ -177,7 +174,7 @@ EXPOSURES = {
     'short_time_gap_s': Exposure(
         's', 'Time with a time gap below {time_gap_s} s',
         'time with a time gap below {time_gap_s} s', _IN_FULL,
-        lambda values, limits: _while(values[COLUMN['time_gap']] < limits.time_gap_s)),
+        lambda values, limits: float(values[COLUMN['time_gap']] < limits.time_gap_s)),
 }
 
 
@@ -330,9 +327,8 @@ class Criticality:
             'thresholds': self.thresholds._asdict(),
             'vehicles': {
                 vehicle.vehicle_id: {
-                    'worst': {name: {'value': worst.value if math.isfinite(worst.value) else None,
-                                     'unit': measure.unit, 'of': worst.other,
-                                     'time_s': worst.time_s}
+                    'worst': {name: {'value': finite(worst.value), 'unit': measure.unit,
+                                     'of': worst.other, 'time_s': worst.time_s}
                               for name, measure in MEASURES.items()
                               if (worst := vehicle.worst.get(name))},
                     'exposures': {name: {'value': value, 'unit': EXPOSURES[name].unit}

@@ -200,7 +200,8 @@ class EncroachmentDetector:
         entered_s = before.time_s + share * (now.time_s - before.time_s)
         passage = _Passage(len(self.crossings), (*self._past, now),
                            [begin + share * (end - begin)])
-        ahead = AHEAD * _direction(now.centers[second] - before.centers[second])
+        way = now.centers[second] - before.centers[second]
+        ahead = AHEAD * (way / np.hypot(*way))
         left_s = _time_left(first, passage.before, _hulls(
             passage.swept[0][None], passage.swept[0][None] + ahead))
         crossing = WayCrossed(first, second, entered_s, max(entered_s - left_s, 0.0), True)
@@ -228,10 +229,6 @@ def _overlap(moment: _Moment, first: int, second: int) -> bool | None:
         return None
     return bool(time_to_contact(moment.outlines[first, None], moment.outlines[second, None],
                                 _STILL, _STILL)[0] == 0.0)
-
-
-def _direction(way: FloatArray) -> FloatArray:
-    return np.asarray(way / np.hypot(*way))
 
 
 def _first_contact(area: FloatArray, begin: FloatArray, end: FloatArray) -> float | None:
