@@ -108,24 +108,16 @@ class MapEntry:
 @dataclass(frozen=True)
 class MapFile:
     """
-    The content of a map's YAML file.
+    A map's YAML file, which has been checked.
 
-    :param path: the YAML file.
-    :param image: the image file, inside the folder of the YAML file.
-    :param resolution: edge of a pixel [m]
-    :param origin: x, y of the lower left corner of the lower left pixel, frame map [m]
-    :param negate: True where white is occupied.
-    :param occupied_thresh: pixels with a larger probability of occupancy are occupied, 0 to 1.
-    :param tile_cells: cells along the edge of a tile, if each pixel represents a tile, else None.
+    :param path: the file.
+    :param image: the image file, inside its folder.
+    :param entry: what it says.
     """
 
     path: Path
     image: Path
-    resolution: float
-    origin: tuple[float, float]
-    negate: bool = False
-    occupied_thresh: float = OCCUPIED_THRESH
-    tile_cells: int | None = None
+    entry: MapEntry
 
     def occupied(self, pixels: NDArray[np.uint8], maximum: int) -> NDArray[np.bool_]:
         """
@@ -136,13 +128,13 @@ class MapFile:
         :return: (rows, columns) with the bottom row first, so that row indices grow with y.
         """
         shade = np.minimum(np.arange(256) / maximum, 1.0)
-        probability = shade if self.negate else 1.0 - shade
+        probability = shade if self.entry.negate else 1.0 - shade
         # Occupied greys are the darkest or the lightest: a comparison is faster than a table.
-        count = int(np.count_nonzero(probability > self.occupied_thresh))
+        count = int(np.count_nonzero(probability > self.entry.occupied_thresh))
         if count in (0, 256):
             return np.full(pixels.shape, count > 0)
         upright = pixels[::-1]
-        return upright >= 256 - count if self.negate else upright < count
+        return upright >= 256 - count if self.entry.negate else upright < count
 
 
 def read_map_file(path: Path) -> MapFile:
@@ -153,10 +145,12 @@ def read_map_file(path: Path) -> MapFile:
     :raises InputError: naming file, key and remedy.
     """
     file = path / INDEX_NAME if path.is_dir() else path
-    where = str(file)
-    entry = read(MapEntry, read_yaml(file, 'map file'), where)
-    return MapFile(file, _image(entry.image, file), entry.resolution, entry.origin[:2],
-                   bool(entry.negate), entry.occupied_thresh, entry.tile_cells)
+    entry = read(MapEntry, read_yaml(file, 'map file'), str(file))
+    image = (file.parent / entry.image).resolve()
+    if not image.is_relative_to(file.parent.resolve()):
+        raise InputError(f'the image {short(entry.image)} lies outside the folder of the map',
+                         str(file), 'put the image beside the YAML file')
+    return MapFile(file, image, entry)
 
 
 def map_text(image: str, resolution: float, origin: tuple[float, float], comment: str = '',
@@ -178,12 +172,3 @@ def map_text(image: str, resolution: float, origin: tuple[float, float], comment
     if tile_cells is not None:
         lines.append(f'tile_cells: {tile_cells}')
     return '\n'.join(lines) + '\n'
-
-
-def _image(name: str, file: Path) -> Path:
-    where = str(file)
-    image = (file.parent / name).resolve()
-    if not image.is_relative_to(file.parent.resolve()):
-        raise InputError(f'the image {short(name)} lies outside the folder of the map', where,
-                         'put the image beside the YAML file')
-    return image

@@ -272,7 +272,7 @@ def check_target(folder: Path, force: bool) -> None:
     if not any(folder.iterdir()):
         return
     try:
-        is_map = read_map_file(folder).tile_cells is not None
+        is_map = read_map_file(folder).entry.tile_cells is not None
     except InputError:
         is_map = False
     if not is_map:

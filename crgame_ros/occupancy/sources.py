@@ -58,7 +58,8 @@ def open_tiles(path: Path) -> TileSource:
     :raises InputError: naming the file and the remedy.
     """
     index = read_map_file(path)
-    return CutImage(index) if index.tile_cells is None else TileFolder(index, index.tile_cells)
+    tile_cells = index.entry.tile_cells
+    return CutImage(index) if tile_cells is None else TileFolder(index, tile_cells)
 
 
 def tile_name(row: int, column: int) -> str:
@@ -81,9 +82,9 @@ class TileFolder:
         if self.rows * self.columns > MAX_TILES:
             raise InputError(f'has {self.columns} x {self.rows} tiles, more than {MAX_TILES}',
                              str(index.image), 'use larger tiles')
-        self.origin, self.tile_cells = index.origin, tile_cells
-        self.resolution = index.resolution / tile_cells
-        self._size = index.resolution
+        self.origin, self.tile_cells = index.entry.origin[:2], tile_cells
+        self.resolution = index.entry.resolution / tile_cells
+        self._size = index.entry.resolution
         self._folder = index.path.parent
         self._filled = index.occupied(image.read((0, self.rows), (0, self.columns)),
                                       image.maximum)
@@ -98,12 +99,12 @@ class TileFolder:
         if not self._filled[row, column]:
             return None
         tile = read_map_file(self._folder / tile_name(row, column))
-        image = open_pgm(tile.image)
+        entry, image = tile.entry, open_pgm(tile.image)
         expected = (self.origin[0] + column * self._size, self.origin[1] + row * self._size)
         if (image.width, image.height) != (self.tile_cells, self.tile_cells) \
-                or tile.tile_cells is not None \
-                or abs(tile.resolution - self.resolution) > 1e-9 * self.resolution \
-                or max(abs(a - b) for a, b in zip(tile.origin, expected, strict=True)) \
+                or entry.tile_cells is not None \
+                or abs(entry.resolution - self.resolution) > 1e-9 * self.resolution \
+                or max(abs(a - b) for a, b in zip(entry.origin[:2], expected, strict=True)) \
                 > 1e-3 * self.resolution:
             raise InputError(
                 f'does not fit into its map: there should be {self.tile_cells} x '
@@ -124,7 +125,7 @@ class CutImage:
     def __init__(self, map_file: MapFile) -> None:
         self._map = map_file
         self._image = open_pgm(map_file.image)
-        self.origin, self.resolution = map_file.origin, map_file.resolution
+        self.origin, self.resolution = map_file.entry.origin[:2], map_file.entry.resolution
         self.tile_cells = min(CUT_CELLS, max(self._image.width, self._image.height))
         if self.resolution * self.tile_cells > MAX_RESOLUTION:
             raise InputError(f'has pixels of {self.resolution:g} m', str(map_file.path),

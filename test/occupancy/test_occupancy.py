@@ -162,5 +162,5 @@ def test_a_folder_stands_for_its_map(tmp_path: Path) -> None:
     """A full turn counts as no turn, and integers are accepted as numbers."""
     write(tmp_path, resolution='1', origin='[3, 4, 6.283185307179586]')
     map_file = read_map_file(tmp_path)
-    assert (map_file.resolution, map_file.origin) == (1.0, (3.0, 4.0))
+    assert (map_file.entry.resolution, map_file.entry.origin[:2]) == (1.0, (3.0, 4.0))
     assert map_file.image == (tmp_path / 'map.pgm').resolve()
