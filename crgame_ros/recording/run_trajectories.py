@@ -101,6 +101,12 @@ class RunTrajectories:
         """Return the transform of each driven vehicle to the road's coordinates (CRG 28)."""
         return self.game.road_transforms
 
+    def states_on_road(self, vehicle: int) -> FloatArray:
+        """Return the states (K, 8) of a driven vehicle, by its number, as its road has them."""
+        states = self.vehicle_states[:, vehicle].copy()
+        states[:, :3] = self.road_transforms[vehicle].to_scenario(states[:, :3])
+        return states
+
     @property
     def finite_vehicle_states(self) -> FloatArray:
         """

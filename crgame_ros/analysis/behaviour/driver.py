@@ -190,8 +190,7 @@ class _Everybody:
         log = record.log
         self.record, self.roads = record, roads
         self.step_s = log.game.scheduler.time_step_s
-        self.times_s = np.multiply(log.ks - log.game.scheduler.k0, self.step_s,
-                                   dtype=np.float64)
+        self.times_s = log.times_s
         self.ids = [item.id for item in log.descriptions]
         self._outlines = [outline(item.shape, _CIRCLE_CORNERS) for item in log.descriptions]
         self._ahead = np.array([item.rear_to_center for item in log.vehicles])
@@ -220,8 +219,7 @@ def _measured(everybody: _Everybody, number: int, limits: ResponseLimits,
     log, vehicle_id = record.log, everybody.ids[number]
     game: GameDocument = log.game
     vehicle = game.vehicles[number].vehicle
-    states = log.vehicle_states[:, number].copy()
-    states[:, :3] = log.road_transforms[number].to_scenario(states[:, :3])
+    states = log.states_on_road(number)
     keeping = keep_lane(everybody.roads, states, vehicle, everybody.step_s,
                         record.jumps(number))
     dt_s = game.scheduler.dt_s

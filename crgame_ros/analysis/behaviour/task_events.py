@@ -78,9 +78,7 @@ def _placed(row: TaskEvent, starts: NDArray[np.float64], dt_s: float) -> TaskEve
 def _row(run: RunRecord, entry: TaskEntry, later: Sequence[TaskEntry], dt_s: float) -> TaskEvent:
     onset_s = entry.n * dt_s
     of_it = [each for each in later if each.task == entry.task and each.number == entry.number]
-    scheduler = run.log.game.scheduler
-    last_s = float(run.log.ks[-1] - scheduler.k0) * scheduler.time_step_s \
-        if len(run.log.ks) else onset_s
+    last_s = float(run.log.times_s[-1]) if len(run.log.ks) else onset_s
     if entry.what == 'unrequested':
         return TaskEvent(entry.kind, entry.task, onset_s, 0.0, math.nan, 'unrequested', 0,
                          entry.seat, 'unrequested', entry.times)

@@ -65,10 +65,9 @@ def measure_rules(record: RunRecord, criticality: Criticality) -> tuple[VehicleR
     found = []
     for column, (item, critical) in enumerate(zip(
             log.vehicles, criticality.report(), strict=True)):
-        states = log.vehicle_states[:, column].copy()
-        states[:, :3] = log.road_transforms[column].to_scenario(states[:, :3])
         passed = rules.passed(DrivenTrack(
-            states, log.ks, item.rear_to_center, item.rear_to_center + 0.5 * item.shape.length,
+            log.states_on_road(column), log.ks, item.rear_to_center,
+            item.rear_to_center + 0.5 * item.shape.length,
             record.jumps(column)))
         unsafe = unsafe_distance(critical.headways, step_s)
         kinds = [each.kind for each in passed]
