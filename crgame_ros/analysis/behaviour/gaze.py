@@ -12,7 +12,6 @@ transition; a blink does not end one.
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 from crgame_ros.game.instruments_spec import GazeSpec
@@ -338,8 +337,7 @@ def glances(steady_s: FloatArray, found: LookedAt) -> list[Glance]:
     dwells = _joined(_looks(steady_s, found))
     dwells = _joined([each for each in dwells if each.end_s - each.start_s >= SHORTEST_S])
     made = []
-    for before, dwell in pairwise([None, *dwells]):
-        assert dwell is not None
+    for before, dwell in zip((None, *dwells), dwells, strict=False):
         way_s = np.inf if before is None else dwell.start_s - before.end_s
         transition_s = float(way_s) if way_s <= LONGEST_GAP_S else 0.0
         made.append(Glance(dwell.area, dwell.start_s - transition_s, transition_s,

@@ -108,8 +108,7 @@ def _is_near(goal: TraceState, positions: NDArray[np.float64]) -> NDArray[np.boo
     """Return which positions (K, 2) may be in a goal's area: those in the box around it."""
     if getattr(goal, 'position', None) is None:
         return np.ones(len(positions), dtype=bool)
-    x_min, y_min, x_max, y_max = group_outline(goal.position).bounds
-    low, high = np.array((x_min, y_min)), np.array((x_max, y_max))
+    low, high = np.reshape(group_outline(goal.position).bounds, (2, 2))
     return np.asarray(((positions >= low - _BOX_MARGIN)
                        & (positions <= high + _BOX_MARGIN)).all(axis=1))
 

@@ -55,7 +55,7 @@ class ComparedRoute:
             if self._blocks:
                 start += roads.line(self._blocks[-1].lanelet).length
             beside = roads.abreast(lanelet)
-            area = shapely.buffer(roads.area_of(beside), 0.01)
+            area = shapely.buffer(roads.area_of(beside), _SLIT)
             shapely.prepare(area)
             self._blocks.append(_Block(lanelet, area, start))
 
