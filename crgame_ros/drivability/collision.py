@@ -168,7 +168,6 @@ class PermanentObstacles:
     A check reads only the cells under the box around the footprint. It takes some 10 microseconds,
     and some 10 more if one of them is occupied.
 
-    :param occupancy: the map.
     :param shapes: (V) shapes of the driven vehicles.
     """
 
@@ -181,7 +180,6 @@ class PermanentObstacles:
         """
         Return whether the footprint of a vehicle overlaps an occupied cell.
 
-        :param index: index of the vehicle.
         :param center: x [m], y [m], yaw [rad] of its centre; NaN: it is absent and hits nothing.
         :raises InputError: if the map cannot be read any more.
         """

@@ -149,7 +149,6 @@ class DrivabilityMonitor:
         Before the first `set_objects` there are only driven vehicles. A vehicle with NaN in its
         pose is absent and valid.
 
-        :param n: simulation step.
         :param seconds_since_tick: simulated time since the states of `set_objects` [s]
         :param vehicle_states: (V, 8) rear-axle states, columns as in `StateColumn`.
         :return: (V) verdicts in the order of `driven`.
@@ -216,7 +215,6 @@ def changes(previous: Sequence[VehicleDrivability], current: Sequence[VehicleDri
     Return the changed verdicts: all at first, then those that differ in more than n.
 
     :param previous: verdicts reported last, empty at the start.
-    :param current: verdicts of this step.
     """
     known = {verdict.vehicle_id: verdict for verdict in previous}
     return tuple([verdict for verdict in current
@@ -229,11 +227,7 @@ def _says_more(known: VehicleDrivability | None, verdict: VehicleDrivability) ->
 
 
 def drivability_status(verdict: VehicleDrivability, spec: DrivabilitySpec) -> Status:
-    """
-    Return the status of a verdict.
-
-    :param spec: of the game: which checks run.
-    """
+    """Return the status of a verdict; the game's spec tells which checks run."""
     faults = verdict.faults
     return Status.of(
         f'{verdict.vehicle_id}/drivability', ERROR if faults else OK,

@@ -79,7 +79,6 @@ class Footprint:
     """
     A shape prepared to be placed at many poses.
 
-    :param shape: the shape around its centre.
     :raises InputError: if a polygon has no area.
     """
 

@@ -43,11 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(values: argparse.Namespace) -> int:
-    """
-    Write the map, and print a summary.
-
-    :return: exit code.
-    """
+    """Write the map, and print a summary; return the exit code."""
     from crgame_ros.occupancy.rasterize import check_target, Raster, write_map
     from crgame_ros.scenario.loading import load_scenario
     spec = RasterSpec(values.resolution, values.tile, values.curb_width, values.min_island,

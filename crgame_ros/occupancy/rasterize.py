@@ -59,7 +59,6 @@ def curbs(network: LaneletNetwork, origin: tuple[float, float], spec: RasterSpec
     stays open where the road ends with the map: where neither a lanelet nor any lanelet beside it
     continues.
 
-    :param network: the lanelet network.
     :param origin: position (x, y) to which the polygons are relative [m]
     :param spec: width of the curbs, smallest island, and whether ends are closed.
     :return: polygons that touch the road but do not overlap it.
@@ -77,7 +76,6 @@ def road_ends(network: LaneletNetwork, origin: tuple[float, float]) -> shapely.M
     """
     Return the lines at which roads end with the map.
 
-    :param network: the lanelet network.
     :param origin: position (x, y) to which the lines are relative [m]
     """
     known = {lanelet.lanelet_id: lanelet for lanelet in network.lanelets}
@@ -123,8 +121,6 @@ class Raster:
     """
     The permanent obstacles of a scenario, cut into tiles.
 
-    :param loaded: the scenario.
-    :param spec: settings of the map.
     :raises InputError: if there is nothing to draw, or the map is too wide.
     """
 
@@ -261,7 +257,6 @@ def check_target(folder: Path, force: bool) -> None:
     """
     Refuse to overwrite existing data.
 
-    :param folder: folder of the map.
     :param force: whether an existing map may be replaced; other data may not.
     :raises InputError: if it exists, with the remedy.
     """
@@ -287,7 +282,6 @@ def write_map(raster: Raster, folder: Path, name: str, force: bool = False,
     """
     Write a map into a folder, which appears once it is complete.
 
-    :param raster: the map to draw.
     :param folder: folder to write; it is created with its parents.
     :param name: name of the scenario, for the comment in the file.
     :param force: whether to replace an existing map.

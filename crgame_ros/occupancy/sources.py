@@ -118,7 +118,6 @@ class CutImage:
     """
     A single map_server map, from which tiles are read as needed.
 
-    :param map_file: the map.
     :raises InputError: if the image cannot be used.
     """
 
@@ -157,7 +156,6 @@ class PgmImage:
     The file is read, not mapped into memory: if a mapped file were truncated, the process would
     crash.
 
-    :param path: the file.
     :param width: pixels in a row.
     :param height: rows; row 0 is the top.
     :param maximum: the value of white, 1 to 255.

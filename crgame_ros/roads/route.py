@@ -36,11 +36,7 @@ class Route:
 
 
 def goal_lanelets(roads: RoadNetwork, problem: PlanningProblem) -> frozenset[int]:
-    """
-    List the lanelets in which the goal position lies.
-
-    :return: empty for a goal without a position.
-    """
+    """List the lanelets in which the goal position lies: none for a goal without a position."""
     listed = problem.goal.lanelets_of_goal_position or {}
     ids = {lanelet for group in listed.values() for lanelet in group}
     ids &= set(roads.lanelet_ids)
@@ -94,11 +90,7 @@ def in_lane(roads: RoadNetwork, route: Route, length: float) -> Route:
 
 
 def start_lanelet(roads: RoadNetwork, x: float, y: float, yaw: float) -> tuple[int, float]:
-    """
-    Find the lanelet at which a vehicle starts, by its position and heading.
-
-    :return: lanelet id and arc length on it [m]
-    """
+    """Find the lanelet at which a vehicle starts, by its pose, and the arc length on it [m]."""
     lanelet = roads.nearest_lanelet(x, y, yaw)
     return lanelet, roads.locate(lanelet, x, y)[0]
 

@@ -164,11 +164,7 @@ class LightCycle:
 
 
 class TrafficLights:
-    """
-    The traffic lights of a scenario that have a cycle.
-
-    :param scenario: the CommonRoad scenario.
-    """
+    """The traffic lights of a scenario that have a cycle."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._cycles = {light.traffic_light_id: LightCycle(light)

@@ -26,11 +26,7 @@ _MOST_PASSED = 4
 
 
 class Turns:
-    """
-    The turns that drivers indicate on their way through a map, found once for each lanelet.
-
-    :param roads: the roads.
-    """
+    """The turns that drivers indicate on their way through a map, found once for each lanelet."""
 
     def __init__(self, roads: RoadNetwork) -> None:
         self._roads = roads

@@ -39,12 +39,7 @@ _INTERACTIVE = 'I'
 
 
 class BenchmarkChoice(NamedTuple):
-    """
-    The part of a benchmark's id that the user chooses.
-
-    :param model: name of the vehicle model.
-    :param cost: name of the cost function.
-    """
+    """The part of a benchmark's id that the user chooses: vehicle model and cost function."""
 
     model: str = 'KS'
     cost: str = 'JB1'
@@ -66,13 +61,11 @@ class JudgedSolution:
     """
     A solution with what CommonRoad's tools say of it.
 
-    :param scenario_id: id of the scenario.
     :param benchmark_id: vehicles, cost functions, scenario and version, as the benchmark names it.
     :param states: number of its states, of all planning problems.
     :param cost: sum over its planning problems; None where it cannot be computed.
     :param faults: why it would be refused, one line each; empty for a valid solution.
     :param remarks: notes, one line each.
-    :param xml_text: the solution file.
     """
 
     scenario_id: str

@@ -61,7 +61,6 @@ class CaseResult:
     """
     What became of a case.
 
-    :param case: the case.
     :param expectations: of the game.
     :param broken: for each of them, how the run broke it, a line for each vehicle.
     :param error: why it could not be run; empty if it could.

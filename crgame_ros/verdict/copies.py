@@ -161,11 +161,7 @@ def _renamed(value: object, place: Placement) -> object:
 
 
 def write_scenario_copy(source: Path, place: Placement, folder: Path) -> str:
-    """
-    Write a scenario placed anew.
-
-    :return: the path as text.
-    """
+    """Write a scenario placed anew, and return the path as text."""
     folder.mkdir(parents=True, exist_ok=True)
     if place.mirrored or place.added:
         source = _edited_scenario(source, place, folder / f'edited-{source.name}')

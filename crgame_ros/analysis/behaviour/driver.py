@@ -104,7 +104,6 @@ class DriverBehaviour:
     """
     The behaviour of a vehicle's driver.
 
-    :param vehicle_id: id of the vehicle.
     :param human: whether the game assigns a human driver; an AV is driven by its planner except
         during take-overs, and its measures of motion cover both.
     :param driven_s: time for which commands of a human drove it [s]
@@ -143,11 +142,7 @@ class DriverBehaviour:
 
 
 def time_above(speed: FloatArray, limits: FloatArray, step_s: float) -> float:
-    """
-    Return the time above the limit [s]; each state counts until the next one.
-
-    :return: NaN where there was no limit at all
-    """
+    """Return the time above a limit [s], NaN if there is none; states count until the next."""
     limited = np.isfinite(limits[:-1])
     if not limited.any():
         return math.nan
@@ -256,12 +251,7 @@ def _motion(everybody: _Everybody, states: FloatArray, keeping: LaneKeeping) -> 
 
 
 def _limits(everybody: _Everybody, visits: Sequence[LaneVisit], count: int) -> FloatArray:
-    """
-    Return the limits (K) of signs and events: NaN off the lanes and where there is none [m/s].
-
-    :param visits: stays in lanelets.
-    :param count: number of steps K.
-    """
+    """Return the limits (K) of signs and events: NaN off the lanes and without one [m/s]."""
     log, fired = everybody.record.log, everybody.record.fired
     actions = {event.name: event.action for event in log.game.events
                if isinstance(event.action, SpeedLimit)}

@@ -100,10 +100,7 @@ class Spread(NamedTuple):
     """
     Statistics of values; NaN where there are none.
 
-    :param mean: arithmetic mean.
     :param sd: standard deviation with N - 1; NaN for fewer than two values.
-    :param least: smallest value.
-    :param most: greatest value.
     """
 
     mean: float

@@ -279,7 +279,6 @@ class Glance(NamedTuple):
     """
     A glance at an area.
 
-    :param area: which.
     :param start_s: begin of the transition towards it, on the steady clock [s]
     :param transition_s: until the gaze is on it [s]
     :param dwell_s: from then until it leaves [s]
@@ -302,7 +301,6 @@ class GlanceSum(NamedTuple):
 
     :param kind: of areas.
     :param object: which; None for all of the kind.
-    :param glances: their number.
     :param total_s: sum of their durations [s]
     :param mean_s: mean duration [s]
     :param longest_s: longest duration [s]

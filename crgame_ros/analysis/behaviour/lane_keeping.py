@@ -106,11 +106,7 @@ def _straight(to_start: FloatArray, chord: FloatArray, velocity: FloatArray) -> 
 
 
 def _around(to_start: FloatArray, chord: FloatArray, arm: FloatArray, yaw_rate: float) -> float:
-    """
-    Return the time to crossing where wheels move on circles.
-
-    :param arm: (W, 2) from the centre of rotation to each wheel [m]
-    """
+    """Return the time to crossing where wheels move on circles; arm (W, 2): from the centre."""
     # |arm + to_start + t chord| = |arm|, solved without subtracting two large squares.
     arm = np.broadcast_to(arm[:, None], to_start.shape)
     square, half = _dot(chord, chord), _dot(to_start + arm, chord)

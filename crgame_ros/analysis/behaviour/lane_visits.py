@@ -38,7 +38,6 @@ class LaneVisit(NamedTuple):
     """
     A stay of a vehicle's reference point in a lanelet.
 
-    :param lanelet: id.
     :param first: scenario step, counted from that of the first pose.
     :param end: the step after the last.
     :param entry: along the lane, by a change from a neighbour, or anew: at the start, from beside
@@ -60,8 +59,6 @@ class LaneVisits:
     A vehicle is in a lanelet until it leaves its area. Then it is in a successor, or in a
     neighbour, which is a lane change. Among overlapping lanelets the one counts in which the
     vehicle stays longest.
-
-    :param roads: the road network.
     """
 
     def __init__(self, roads: RoadNetwork) -> None:
@@ -166,13 +163,7 @@ class LaneVisits:
 
 
 class LaneStrip(NamedTuple):
-    """
-    A lane in the direction in which it is driven.
-
-    :param center: its centre line.
-    :param left: its left boundary.
-    :param right: its right boundary.
-    """
+    """A lane in the direction in which it is driven: its centre line and both boundaries."""
 
     center: Curve
     left: Curve

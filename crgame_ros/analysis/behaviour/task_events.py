@@ -26,7 +26,6 @@ class TaskEvent(NamedTuple):
     One event of a task. Times are of the run's clock, NaN where there is none.
 
     :param kind: kind of task: detection_response, take_over or secondary_task.
-    :param name: name of the task.
     :param onset_s: since the run's start [s]
     :param duration_s: time that the light was on, until a request was obeyed or withdrawn, or
         until a task ended [s]
@@ -140,7 +139,6 @@ class DetectionScore(NamedTuple):
 
     Stimuli that no page showed, and open ones at the end, do not count.
 
-    :param task: its name.
     :param seat: the vehicle whose driver answered.
     :param stimuli: number of those that were shown and are neither open nor answered too early.
     :param hits: stimuli answered in time.
@@ -172,11 +170,7 @@ class DetectionScore(NamedTuple):
 
 
 def detection_scores(events: Sequence[TaskEvent]) -> list[DetectionScore]:
-    """
-    Score every detection response task of a run, in the order of their beginnings.
-
-    :param events: events of the run, from `task_events`.
-    """
+    """Score the detection response tasks of a run, in order, from its `task_events`."""
     of_kind = [event for event in events if event.kind == 'detection_response']
     return [_score(name, [event for event in of_kind if event.name == name])
             for name in dict.fromkeys(event.name for event in of_kind)]

@@ -117,7 +117,6 @@ class OwnPaths:
 
     Off the road, and at a large angle to the lane, a vehicle's path is straight ahead.
 
-    :param roads: the road network.
     :param goals: (V) lanelets of each vehicle's goal; empty: it follows its lane.
     """
 
@@ -130,7 +129,6 @@ class OwnPaths:
         """
         Return the path of a vehicle, with positions relative to it.
 
-        :param vehicle: its number among the driven ones.
         :param yaw: yaw of the vehicle [rad]
         :param positions: (N, 2) the vehicle's centre, then any other points [m]
         """

@@ -47,7 +47,6 @@ class StopLine(NamedTuple):
     """
     A line across a lane.
 
-    :param lanelet: id of the lanelet.
     :param middle: (2) [m]
     :param ahead: (2) unit vector across the line, in the lane's direction.
     :param half: half of its length [m]
@@ -188,7 +187,6 @@ class PassedLine(NamedTuple):
 
     :param kind: of the rule that it broke.
     :param k: scenario step at which the front was on the line, with its fraction.
-    :param lanelet: id of the line's lanelet.
     :param speed: of the vehicle there [m/s]
     """
 
@@ -203,7 +201,6 @@ class LineRules:
     The lights and stop signs of a map, and who heeds them.
 
     :param scenario: with lanelets, lights and signs.
-    :param roads: its roads.
     :ivar lines: with a light or a stop sign.
     """
 

@@ -38,7 +38,6 @@ class VehicleRules:
     """
     How a vehicle kept traffic rules.
 
-    :param vehicle_id: id of the vehicle.
     :param values: by the names of `RULE_MEASURES`; None where undefined.
     :param passed: lines that it passed at red, or without the halt of a stop sign, in order.
     """

@@ -27,11 +27,8 @@ class JudgedCollision:
     """
     The first contact of the vehicle with another.
 
-    :param other_id: id of the other.
-    :param other_kind: kind of the other.
     :param step: time step, counted from the drive's first.
     :param time_s: the same as a time [s]
-    :param kind: kind of the collision.
     :param at_fault: whether it counts as the vehicle's fault.
     """
 

@@ -51,7 +51,6 @@ class TrajectoryCost:
     """
     The cost of a trajectory by one function.
 
-    :param name: name of the function.
     :param total: its value; None where it cannot be computed.
     :param parts: its partial costs without weights, by name.
     :param reason: why there is no value; empty otherwise.

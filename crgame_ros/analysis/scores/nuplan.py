@@ -113,12 +113,7 @@ BOUNDS = {
 
 
 class DriveComfort(NamedTuple):
-    """
-    The extremes of a drive.
-
-    :param lowest: smallest value by name of `BOUNDS`.
-    :param highest: largest value.
-    """
+    """The extremes of a drive, by the names of `BOUNDS`."""
 
     lowest: dict[str, float]
     highest: dict[str, float]
@@ -270,10 +265,7 @@ class NuplanScore:
     :param against: longest distance driven against the lane within a second [m]
     :param own_progress: progress along the expert's route [m]
     :param expert_progress: progress of the expert [m]
-    :param expert: name of the expert.
     :param least_ttc_s: smallest time to collision within the horizon; inf without one [s]
-    :param speed: compliance with speed limits.
-    :param comfort: extremes of comfort.
     :param remarks: notes that matter for comparisons, one line each.
     """
 
@@ -312,11 +304,7 @@ class NuplanScore:
 
 
 class NuplanScorer:
-    """
-    Scores drives on one road network.
-
-    :param loaded: the scenario.
-    """
+    """Scores drives on the roads of a scenario."""
 
     def __init__(self, loaded: LoadedScenario) -> None:
         self._roads = RoadNetwork(loaded.scenario.lanelet_network)

@@ -41,7 +41,6 @@ class ComparedRoute:
     """
     A route of successive lanelets; neighbours in the same direction count as the lanelet itself.
 
-    :param roads: the road network.
     :param lanelets: in driving order; neighbours and repetitions are merged.
     """
 

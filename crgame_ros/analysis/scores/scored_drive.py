@@ -50,7 +50,6 @@ class ScoredDrive:
     """
     A vehicle's motion at K equal time steps, in the coordinates of the road.
 
-    :param vehicle_id: id of the vehicle.
     :param dt_s: time between the steps [s]
     :param shape: footprint around the centre.
     :param rear_to_center: from the rear axle forward to the centre [m]
@@ -90,11 +89,7 @@ def kind_of_type(type_name: str) -> TrackKind:
 
 
 def drive_of(log: RunTrajectories, vehicle: int) -> ScoredDrive:
-    """
-    Return one vehicle's drive from a run.
-
-    :param vehicle: its number among the driven ones.
-    """
+    """Return a vehicle's drive from a run, by its number among the driven ones."""
     offsets = np.array([item.rear_to_center for item in log.vehicles])
     centers = shifted(log.vehicle_states[:, :, :3], offsets)
     poses = np.concatenate((centers, log.object_poses), axis=1)

@@ -85,7 +85,6 @@ def expert_of_run(expert: RunTrajectories, log: RunTrajectories, name: str) -> E
     """
     Return the expert from a run: its first human, or else its first vehicle.
 
-    :param expert: the expert's run.
     :param log: the run that is scored; the expert's poses are cut and padded to its steps.
     :param name: name of the expert's run, for people.
     :raises InputError: if the expert's run has no driven vehicle, or another scenario or times.
@@ -108,12 +107,7 @@ def expert_of_run(expert: RunTrajectories, log: RunTrajectories, name: str) -> E
 
 def _recorded_expert(scored: ScoredScenario, problem: PlanningProblem | None,
                      first_k: int, steps: int) -> Expert | None:
-    """
-    Return the recorded obstacle that a planning problem replaced; None where there is none.
-
-    :param first_k: time step at which the drive begins.
-    :param steps: number of its steps.
-    """
+    """Return the recorded obstacle that a planning problem replaced; None where there is none."""
     obstacle = None if problem is None else scored.own.get(problem.planning_problem_id)
     if obstacle is None:
         return None

@@ -61,7 +61,6 @@ def score_run(record: RunRecord, *, expert: Expert | None = None,
     """
     Score every driven vehicle of a run.
 
-    :param record: the run.
     :param expert: expert with which the vehicles' progress is compared; None: the recorded
         obstacle that a planning problem replaced, else a free drive at the speed limit.
     :param plans: plan records by AV (`plan_record`).

@@ -39,7 +39,6 @@ class ScoredScenario:
     """
     A scenario, with the obstacles that represent the vehicles of its planning problems.
 
-    :param loaded: the scenario.
     :param own: ids of these obstacles, by planning problem.
     """
 

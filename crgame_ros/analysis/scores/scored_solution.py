@@ -46,7 +46,6 @@ def score_solutions(scored: ScoredScenario, solutions: Mapping[str, Solution],
     """
     Score solutions of a scenario.
 
-    :param scored: the scenario.
     :param solutions: solutions by the name used in the scores.
     :param progress: called with the share done so far, 0 to 1.
     :raises InputError: if one is for another scenario, or cannot be driven at all.

@@ -65,8 +65,6 @@ def _check_solution(scenario: Scenario, problem: PlanningProblem,
 
     :param scenario: the scenario without the vehicle itself.
     :param poses: (K, 3) poses of the centre.
-    :param feasibility: result of the feasibility check.
-    :param boundary: boundary of the road.
     :param earlier: failures of checks of the whole solution, by name.
     """
     from crgame_ros.analysis.scores.checker import solution_checker
@@ -136,11 +134,7 @@ class SolutionScores:
 
 
 class SolutionJudge:
-    """
-    Judges solutions of one scenario.
-
-    :param scored: the scenario.
-    """
+    """Judges solutions of one scenario."""
 
     def __init__(self, scored: ScoredScenario) -> None:
         self._scored = scored
@@ -153,7 +147,6 @@ class SolutionJudge:
         """
         Judge one solution.
 
-        :param found: the solution.
         :param driven: its states; if it holds inputs, the states that result from these.
         :param exact_type: whether its vehicle type has the vehicle's dimensions.
         :param failed: failures of other checks of the solution, by name.

@@ -125,7 +125,6 @@ class PlannerScores:
 
     :param scenario_id: id of the scenario that the vehicles or solutions drove in.
     :param xml_text: that scenario.
-    :param vehicles: scores of each vehicle.
     :param remarks: notes, one line each.
     """
 
