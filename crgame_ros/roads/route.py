@@ -79,11 +79,7 @@ def find_route(roads: RoadNetwork, start: int, start_s: float, goals: frozenset[
 
 
 def in_lane(roads: RoadNetwork, route: Route, length: float) -> Route:
-    """
-    Return the route without its lane changes: the first leg, extended.
-
-    :param length: distance by which the leg is extended [m]
-    """
+    """Return the route without its lane changes: the first leg, extended by a length [m]."""
     leg = list(route.legs[0])
     ends = _prolong(roads, leg, length)
     return Route((tuple(leg),), None, ends)

@@ -103,11 +103,7 @@ def has_arrow(light: TrafficLight) -> bool:
 
 
 def lights_for(lights: list[TrafficLight], arrow: str) -> list[TrafficLight]:
-    """
-    Return the lights that apply to a movement; all lights if none does.
-
-    :param arrow: straight, left or right.
-    """
+    """Return the lights for a movement (straight, left or right); all lights if none is."""
     return [light for light in lights
             if not has_arrow(light) or arrow in light.direction.value.lower()] or lights
 

@@ -82,11 +82,7 @@ class DriverControls:
                     for piece in self.pieces()), 0.0)
 
     def even_pieces(self, values: FloatArray) -> list[FloatArray]:
-        """
-        Resample values linearly, each piece at the nominal step.
-
-        :param values: (R) at `times_s`.
-        """
+        """Resample values (R) at `times_s` linearly, each piece at the nominal step."""
         found = []
         for piece in self.pieces():
             times_s = self.times_s[piece]

@@ -66,11 +66,7 @@ class LaneVisits:
         self._areas: dict[int, shapely.Geometry] = {}
 
     def follow(self, poses: FloatArray) -> tuple[LaneVisit, ...]:
-        """
-        Return the stays in lanes for cars, in order.
-
-        :param poses: (K, 3) of the reference point, at the scenario's steps; finite.
-        """
+        """Return the stays in lanes for cars, of finite poses (K, 3) at the scenario's steps."""
         return tuple(self._visits(poses)) if self._roads.lanelet_ids else ()
 
     def _visits(self, poses: FloatArray) -> Iterator[LaneVisit]:

@@ -49,11 +49,7 @@ class GoalRecord:
 
 
 def find_goal(problem: PlanningProblem, states: Sequence[KSState], dt_s: float) -> GoalRecord:
-    """
-    Find when a drive reached its goal, and how near it came.
-
-    :param states: states from time step 0 on.
-    """
+    """Find when a drive, from time step 0 on, reached its goal, and how near it came."""
     step = goal_step(problem, list(states))
     points = shapely.points([state.position for state in states])
     areas = [group_outline(state.position) for state in problem.goal.state_list
