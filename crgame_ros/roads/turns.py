@@ -3,6 +3,7 @@
 """Turns of lanelets, and the side of each other on which lanelets lie, for indicators."""
 
 from collections.abc import Iterable
+from functools import cache
 import math
 
 from crgame_ros.roads.network import RoadNetwork
@@ -30,8 +31,8 @@ class Turns:
 
     def __init__(self, roads: RoadNetwork) -> None:
         self._roads = roads
-        self._turns: dict[tuple[int, int | None], Light | None] = {}
-        self._rings: dict[int, float] = {}
+        self._turn = cache(self._find_turn)
+        self._ring = cache(self._find_ring)
         # Turns that the map names, for forks whose other branches are beyond the map or not
         # drivable: pairs of the lanelet before, or None for any, and the lanelet.
         self._named = frozenset(
@@ -39,8 +40,8 @@ class Turns:
             for incoming in intersection.incomings
             for before in (*incoming.incoming_lanelets, None)
             for lanelet in incoming.successors_left | incoming.successors_right)
-        self._ways: dict[tuple[int, int], tuple[int, ...]] = {}
-        self._sides: dict[tuple[int, int], Light | None] = {}
+        self._way = cache(self._find_way)
+        self._side = cache(self._find_side)
 
     def turn_on(self, lanelet: int, before: int | None = None) -> Light | None:
         """
@@ -50,9 +51,7 @@ class Turns:
 
         :param before: the lanelet before it on the way; None for any.
         """
-        if (lanelet, before) not in self._turns:
-            self._turns[lanelet, before] = self._find_turn(lanelet, before)
-        return self._turns[lanelet, before]
+        return self._turn(lanelet, before)
 
     def is_only_way(self, before: int, lanelet: int) -> bool:
         """Return whether the only way from a lanelet, or from beside it, is to the next one."""
@@ -66,9 +65,7 @@ class Turns:
 
     def between(self, before: int, after: int) -> tuple[int, ...]:
         """Return the lanelets behind one up to another; empty if there is no way."""
-        if (before, after) not in self._ways:
-            self._ways[before, after] = self._find_way(before, after)
-        return self._ways[before, after]
+        return self._way(before, after)
 
     def _find_way(self, before: int, after: int) -> tuple[int, ...]:
         chains: list[tuple[int, ...]] = [(before,)]
@@ -87,9 +84,7 @@ class Turns:
         The other one may be of the other direction. Sides are as seen in the direction of the
         first lane.
         """
-        if (before, after) not in self._sides:
-            self._sides[before, after] = self._find_side(before, after)
-        return self._sides[before, after]
+        return self._side(before, after)
 
     def _find_side(self, before: int, after: int) -> Light | None:
         roads = self._roads
@@ -132,12 +127,6 @@ class Turns:
     def _bend(self, lanelet: int) -> float:
         heading = self._roads.line(lanelet).heading
         return float(heading[-1] - heading[0])
-
-    def _ring(self, lanelet: int) -> float:
-        """Return the total turn of the ring to which a lanelet belongs [rad]; 0 without one."""
-        if lanelet not in self._rings:
-            self._rings[lanelet] = self._find_ring(lanelet)
-        return self._rings[lanelet]
 
     def _is_round(self, lanelet: int, turned: float) -> bool:
         """Return whether a lanelet may be part of a roundabout: it bends as those before it."""
