@@ -104,13 +104,9 @@ def _row(run: RunRecord, entry: TaskEntry, later: Sequence[TaskEntry], dt_s: flo
     response_s = math.nan if times.response_ms is None else times.response_ms / 1e3
     lit_s = next((spec.task.shown for spec in run.log.game.tasks if spec.name == entry.task
                   and isinstance(spec.task, DetectionResponse)), duration_s)
-    return TaskEvent(entry.kind, entry.task, onset_s, min(lit_s, duration_s, _or_inf(response_s)),
-                     response_s,
-                     closed.by or 'missed', entry.number, entry.seat, 'stimulus', times)
-
-
-def _or_inf(seconds: float) -> float:
-    return math.inf if math.isnan(seconds) else seconds
+    on_s = float(np.nanmin((lit_s, duration_s, response_s)))
+    return TaskEvent(entry.kind, entry.task, onset_s, on_s, response_s, closed.by or 'missed',
+                     entry.number, entry.seat, 'stimulus', times)
 
 
 def first_input(run: RunRecord, vehicle_id: str, request_s: float) -> float:
