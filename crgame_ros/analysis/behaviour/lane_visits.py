@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The lanelets that a driven vehicle was in, where it changed, and its lane as a strip."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from enum import Enum
 import math
 from typing import NamedTuple, Self
@@ -140,22 +140,18 @@ class LaneVisits:
     def _along(self, lanelet: int) -> list[int]:
         """List the lanelets before and behind one, nearest first."""
         found: list[int] = []
-        network = self._roads.lanelet_network
-        for kind in ('successor', 'predecessor'):
+        for onward in (self._roads.successors, self._roads.predecessors):
             border = [lanelet]
             for _ in range(_BETWEEN):
-                border = self._known(each for one in border for each in getattr(
-                    network.find_lanelet_by_id(one), kind) if each not in found)
+                border = list(dict.fromkeys(each for one in border for each in onward(one)
+                                            if each not in found))
                 found += border
         return list(dict.fromkeys(each for each in found if each != lanelet))
 
     def _beside(self, lanelet: int) -> list[int]:
         found = self._roads.lanelet_network.find_lanelet_by_id(lanelet)
-        return self._known((found.adj_left, found.adj_right))
-
-    def _known(self, lanelets: Iterable[int | None]) -> list[int]:
-        known = set(self._roads.lanelet_ids)
-        return [each for each in dict.fromkeys(lanelets) if each in known]
+        return [each for each in dict.fromkeys((found.adj_left, found.adj_right))
+                if each in self._roads.lanelet_ids]
 
 
 class LaneStrip(NamedTuple):
@@ -207,8 +203,7 @@ def strip_of(roads: RoadNetwork, visits: Sequence[LaneVisit], number: int) -> La
     length = 0.0
     for follower in visits[number + 1:]:
         if follower.entry is not LaneEntry.ALONG or follower.against or length > AHEAD \
-                or follower.lanelet not in roads.lanelet_network.find_lanelet_by_id(
-                    taken[-1]).successor:
+                or follower.lanelet not in roads.successors(taken[-1]):
             break
         taken.append(follower.lanelet)
         length += roads.line(follower.lanelet).length
