@@ -81,8 +81,7 @@ def _progress(what: str) -> 'Progress':
 
 
 def _score_run(values: argparse.Namespace) -> 'list[PlannerScores]':
-    from crgame_ros.analysis.scores.scored_drives import expert_of_run
-    from crgame_ros.analysis.scores.scored_run import score_run
+    from crgame_ros.analysis.scores.scored_run import expert_of_run, score_run
     from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
     from crgame_ros.recording.recorded_plans import plans_of_report
     from crgame_ros.recording.run_folder import recording_in

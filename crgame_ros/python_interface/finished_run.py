@@ -105,8 +105,7 @@ class Run(MeasuredRun):
         :param expert: run whose first human's progress is the measure.
         :raises InputError: if it has no driven vehicle, or cannot be exported.
         """
-        from crgame_ros.analysis.scores.scored_drives import expert_of_run
-        from crgame_ros.analysis.scores.scored_run import score_run
+        from crgame_ros.analysis.scores.scored_run import expert_of_run, score_run
         measure = None if expert is None else expert_of_run(expert.log, self.log, expert.name)
         found = score_run(self.record, expert=measure, plans=self.answers)
         return Named(VEHICLE, ((each.vehicle_id, each) for each in found.vehicles))

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.analysis.scores.scored_drives import score_drives
+from crgame_ros.analysis.scores.scored_run import score_drives
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.game import load_game
 from crgame_ros.game.seat_documents import DRIVERS, DrivingSpell, DrivingSpells

@@ -2,26 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scores of the driven vehicles of a run: with or without CommonRoad's tools."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
 from commonroad.common.solution import CostFunction, PlanningProblemSolution, VehicleModel
+from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.analysis.scores.driven_states import (
     choose_type,
     driven_states,
     until_goal,
 )
-from crgame_ros.analysis.scores.nuplan import Expert
-from crgame_ros.analysis.scores.scored_drives import first_ends, score_drives
+from crgame_ros.analysis.scores.nuplan import Expert, NuplanScore, NuplanScorer
+from crgame_ros.analysis.scores.scored_drive import drive_of, ScoredDrive
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_judge import SolutionJudge
 from crgame_ros.analysis.scores.vehicle import find_goal, PlannerScores, REMARKS, VehicleScores
-from crgame_ros.errors import CrgameError, one_line
+from crgame_ros.errors import CrgameError, InputError, one_line
+from crgame_ros.game.objects import Role
+from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.recording.recorded_plans import PlanOutcome
 from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.recording.run_trajectories import RunTrajectories
+from crgame_ros.scenario.loading import parse_scenario
+import numpy as np
 from shapely.errors import GEOSException
 
 
@@ -103,3 +108,102 @@ def _judged(log: RunTrajectories, number: int, drive: VehicleScores, problem_id:
         drive, commonroad=judge.judge(solved, trajectory, exact_type=chosen.is_exact,
                                       progress=progress),
         goal=goal, remarks=(*remarks, *drive.remarks))
+
+
+def score_drives(log: RunTrajectories, *, expert: Expert | None = None,
+                 plans: Mapping[str, PlanOutcome] | None = None,
+                 put_back: Mapping[str, Sequence[int]] | None = None
+                 ) -> tuple[VehicleScores, ...]:
+    """
+    Score the drive of every driven vehicle of a run, without CommonRoad's tools.
+
+    :param put_back: last scenario steps before vehicles were put back on their lane: each is
+        scored up to the first of these, because the jump is not driven.
+    :param expert: as for `score_run`.
+    :param plans: as for `score_run`.
+    :raises InputError: if the run has no driven vehicle.
+    """
+    if not log.vehicles:
+        raise InputError('it has no driven vehicle', 'the run',
+                         'score a run with a human or an AV')
+    original = parse_scenario(log.xml_text, '/scenario/xml')
+    scorer, scored = NuplanScorer(original), ScoredScenario.from_file(original)
+    problems = {problem.planning_problem_id: problem for problem in original.planning_problems}
+    vehicles, ends = [], first_ends(log, put_back or {})
+    for number, item in enumerate(log.vehicles):
+        av, driven = log.game.av(item.id), ends.get(item.id, log)
+        remarks: list[str] = []
+        nuplan = score_drive(
+            scorer, drive_of(driven, number), scored,
+            None if av is None else problems.get(av.planning_problem), int(driven.ks[0]), remarks,
+            expert)
+        if item.id in ends:
+            scheduler = log.game.scheduler
+            end_s = (int(driven.ks[-1]) - scheduler.k0) * scheduler.time_step_s
+            remarks.append(f'scored up to {end_s:.1f} s: {item.id} was then put back on its lane, '
+                           'and this jump was not driven')
+        vehicles.append(VehicleScores(
+            item.id, 'human' if item.role is Role.HUMAN else 'autonomous',
+            '' if av is None else av.planner, nuplan, None, None, (plans or {}).get(item.id),
+            tuple(remarks)))
+    return tuple(vehicles)
+
+
+def first_ends(log: RunTrajectories,
+               put_back: Mapping[str, Sequence[int]]) -> dict[str, RunTrajectories]:
+    """Return the run, up to the step before, for each vehicle that was put back on its lane."""
+    return {vehicle: log.until(min(ks)) for vehicle, ks in put_back.items()}
+
+
+def score_drive(scorer: NuplanScorer, drive: ScoredDrive, scored: ScoredScenario,
+                problem: PlanningProblem | None, first_k: int, remarks: list[str],
+                expert: Expert | None = None) -> NuplanScore | None:
+    """
+    Return nuPlan's score of a drive; without a score, add a remark that says why.
+
+    :param scored: the scenario that the problem is of.
+    :param first_k: time step at which the drive begins.
+    :param expert: None for the obstacle that the problem replaced, where there is one.
+    """
+    expert = expert or _recorded_expert(scored, problem, first_k, len(drive.poses))
+    try:
+        return scorer.score(drive, expert, problem)
+    except InputError as error:
+        remarks.append(f'no nuPlan score: {error}')
+        return None
+
+
+def expert_of_run(expert: RunTrajectories, log: RunTrajectories, name: str) -> Expert:
+    """
+    Return the expert from a run: its first human, or else its first vehicle.
+
+    :param log: the run that is scored; the expert's poses are cut and padded to its steps.
+    :param name: name of the expert's run, for people.
+    :raises InputError: if the expert's run has no driven vehicle, or another scenario or times.
+    """
+    if not expert.vehicles:
+        raise InputError('it has no driven vehicle', name, 'give a run with a human')
+    if expert.game.scheduler.time_step_s != log.game.scheduler.time_step_s:
+        raise InputError('its time steps are not as long as those of the run', name,
+                         'give a run of the same scenario')
+    item = expert.vehicles[0]
+    centers = shifted(expert.vehicle_states[:, 0, :3], item.rear_to_center)
+    rows = np.arange(len(log.ks)) + int(log.ks[0] - expert.ks[0])
+    poses = np.full((max(0, min(len(rows), len(expert.ks) - int(rows[0]))), 3), np.nan)
+    known = rows[:len(poses)] >= 0
+    poses[known] = centers[rows[:len(poses)][known]]
+    if not np.isfinite(poses).any():
+        raise InputError('it drove at other times', name, 'give a run of the same scenario')
+    return Expert(f'{item.id} of {name}', poses)
+
+
+def _recorded_expert(scored: ScoredScenario, problem: PlanningProblem | None,
+                     first_k: int, steps: int) -> Expert | None:
+    """Return the recorded obstacle that a planning problem replaced; None where there is none."""
+    obstacle = None if problem is None else scored.own.get(problem.planning_problem_id)
+    if obstacle is None:
+        return None
+    course = scored.course(obstacle)[first_k:first_k + steps]
+    if not np.isfinite(course).any():
+        return None
+    return Expert(f'recorded obstacle {obstacle}', course)

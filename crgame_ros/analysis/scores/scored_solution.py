@@ -16,7 +16,7 @@ from commonroad.planning.planning_problem import PlanningProblem, PlanningProble
 from commonroad.scenario.trajectory import Trajectory
 from crgame_ros.analysis.scores.nuplan import NuplanScorer
 from crgame_ros.analysis.scores.scored_drive import drive_among, ScoredDrive, Track
-from crgame_ros.analysis.scores.scored_drives import score_drive
+from crgame_ros.analysis.scores.scored_run import score_drive
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_judge import (
     failures,
