@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
+from commonroad.common.common_lanelet import RoadUser
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.analysis.scores.collisions_by_kind import (
     AHEAD,
@@ -19,7 +20,6 @@ from crgame_ros.analysis.scores.collisions_by_kind import (
 from crgame_ros.analysis.scores.route_progress import (
     ComparedRoute,
     find_lanes,
-    is_two_way,
     LanesDriven,
     progress_ratio,
     route_of,
@@ -55,6 +55,7 @@ TOO_FAST = 2.23
 # for less than the second it halves the score [m] (nuplan-devkit,
 # driving_direction_compliance.py).
 WINDOW_S, TOLERATED, VIOLATED = 1.0, 2.0, 6.0
+_CARS = frozenset({RoadUser.VEHICLE, RoadUser.CAR})
 
 
 def times_to_contact(drive: ScoredDrive, lanes: LanesDriven,
@@ -211,7 +212,7 @@ def driven_against(roads: RoadNetwork, drive: ScoredDrive, lanes: LanesDriven) -
     ways = np.zeros(len(drive.poses))
     points = drive.poses[:, :2]
     for lanelet in np.unique(lanes.lanelets[lanes.lanelets >= 0]).tolist():
-        if is_two_way(network, lanelet):
+        if network.find_lanelet_by_id(lanelet).user_bidirectional & _CARS:
             continue
         ends = np.flatnonzero(lanes.lanelets[1:] == lanelet) + 1
         line = roads.line(lanelet)
@@ -221,11 +222,6 @@ def driven_against(roads: RoadNetwork, drive: ScoredDrive, lanes: LanesDriven) -
     total: NDArray[np.float64] = np.concatenate(([0.0], np.cumsum(ways)))
     first = np.maximum(np.arange(1, len(total)) - window, 0)
     return max(0.0, -float((total[1:] - total[first]).min()))
-
-
-def direction_score(against: float) -> float:
-    """Return the score 1, 0.5 or 0 for a distance against the lane [m]."""
-    return 1.0 if against < TOLERATED else 0.5 if against < VIOLATED else 0.0
 
 
 # nuplan-devkit, metric_aggregator/closed_loop_nonreactive_agents_weighted_average.yaml.
@@ -337,7 +333,8 @@ class NuplanScorer:
         return NuplanScore(
             {'no_collision_at_fault': collision_score(collisions),
              'drivable_area': float(overhang < OVERHANG),
-             'driving_direction': direction_score(against),
+             'driving_direction': 1.0 if against < TOLERATED else 0.5 if against < VIOLATED
+             else 0.0,
              'making_progress': float(ratio > LEAST_PROGRESS)},
             {'progress': ratio, 'time_to_collision': float((times > LEAST_TTC_S).all()),
              'speed_limit': speed.score, 'comfort': float(not comfort.exceeded)},

@@ -6,8 +6,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from commonroad.common.common_lanelet import LaneletType, RoadUser
-from commonroad.scenario.lanelet import LaneletNetwork
+from commonroad.common.common_lanelet import LaneletType
 from crgame_ros.analysis.scores.scored_drive import ScoredDrive
 from crgame_ros.roads.network import first_of_junctions, RoadNetwork
 import numpy as np
@@ -25,7 +24,6 @@ FREE_ACCELERATION, UNLIMITED = 2.40, 50.0 / 3.6
 _FREE_STEP_S = 0.01
 # Neighbouring lanelets are often millimetres apart; such gaps are closed [m].
 _SLIT = 0.01
-_CARS = frozenset({RoadUser.VEHICLE, RoadUser.CAR})
 
 
 @dataclass(frozen=True)
@@ -169,11 +167,6 @@ def find_lanes(roads: RoadNetwork, drive: ScoredDrive) -> LanesDriven:
     axles = roads.lanelets_near(drive.rear_axles[:, :2], _SLIT)
     return LanesDriven(ids[numbers], one,
                        np.array([bool(found & crossing) for found in axles], dtype=bool))
-
-
-def is_two_way(network: LaneletNetwork, lanelet_id: int) -> bool:
-    """Return whether cars may use a lanelet in both directions."""
-    return bool(network.find_lanelet_by_id(lanelet_id).user_bidirectional & _CARS)
 
 
 def _share_a_lane(roads: RoadNetwork, corners: Sequence[frozenset[int]], length: float) -> bool:
