@@ -8,7 +8,7 @@ computed again, has no contact when the body brakes with its full deceleration f
 the other was in its way. The other body moves as it did.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Literal, TypeAlias
 
@@ -115,8 +115,8 @@ def could_avoid(mine: Course, other: Course, step: int, dt_s: float) -> bool:
     yaws = np.unwrap(driven[:, 2])
     poses = np.column_stack([np.interp(way, moved, column)
                              for column in (driven[:, 0], driven[:, 1], yaws)])
-    again = Course(mine.shape, poses, mine.speeds, mine.braking, mine.reaction_s)
-    there = Course(other.shape, other.poses[start:end], other.speeds, 0.0, 0.0)
+    again = replace(mine, poses=poses)
+    there = replace(other, poses=other.poses[start:end])
     return not any(_touch(again, there, index) for index in range(0, len(poses), stride))
 
 

@@ -157,10 +157,8 @@ class DrivabilityMonitor:
         centers = self._centers(vehicle_states)
         hits = self._hits(centers, seconds_since_tick)
         verdicts = []
-        for index, vehicle_id in enumerate(self._ids):
-            hit = hits[index]
-            off_road = self._is_off_road(index, centers[index])
-            collision = bool(hit)
+        for index, (vehicle_id, hit) in enumerate(zip(self._ids, hits, strict=True)):
+            collision, off_road = bool(hit), self._is_off_road(index, centers[index])
             verdicts.append(VehicleDrivability(
                 vehicle_id, collision, off_road, hit, n,
                 self._stops[index] and (collision or off_road)))
