@@ -88,7 +88,7 @@ def run(values: argparse.Namespace) -> int:
             print(f'       {result.case.name}: {result.folder / REPORT_FILE}')
             print(f'       {" " * len(result.case.name)}  {replay_command(result.folder)}')
     if values.junit is not None:
-        write_bytes(junit_xml(verdicts, 'crgame test'), values.junit)
+        write_bytes(junit_xml(verdicts), values.junit)
     page = write_page(verdicts, results, values.out)
     failed = {(str(result.case.game.resolve()), result.case.seed)
               for result in results if not result.is_good}
