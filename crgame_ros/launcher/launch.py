@@ -128,7 +128,7 @@ class Graph:
             self._say(f'[{node.spec.name:{self._width}}] {line}')
 
     def _restart_dead(self, first: str) -> None:
-        """Report a node that died, and start it again where that is safe."""
+        """Report a node that died, and start it again, except for the first one."""
         for name, node in list(self._nodes.items()):
             code = node.exit_code()
             if name == first or code is None or name in self._given_up:
@@ -138,7 +138,7 @@ class Graph:
             now_s = time.monotonic()
             died_s = [at for at in self._died_s.get(name, []) if now_s - at < RESTARTS_S] + [now_s]
             self._died_s[name] = died_s
-            if not node.spec.restart or code == 2 or len(died_s) > MAX_RESTARTS:
+            if code == 2 or len(died_s) > MAX_RESTARTS:
                 self._say(f'{name} died ({cause}); the others go on')
                 self._given_up.add(name)
                 continue

@@ -38,17 +38,20 @@ class NodeSpec:
     The specification of a node's process.
 
     :param executable: sim_node, planner_node, …
-    :param name: node name in the graph; the prefix of its output.
     :param parameters: ROS parameters; a path is passed as text.
     :param nice: its niceness, to give the simulation priority.
-    :param restart: whether it may be started again when it dies.
+    :param vehicle: id of the only one that it is for, a parameter of it; empty if it is for all.
     """
 
     executable: str
-    name: str
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     nice: int = 0
-    restart: bool = False
+    vehicle: str = ''
+
+    @property
+    def name(self) -> str:
+        """Return the node's name in the graph; the prefix of its output."""
+        return f'{self.executable}_{self.vehicle}' if self.vehicle else self.executable
 
     @property
     def module(self) -> str:
@@ -58,7 +61,8 @@ class NodeSpec:
     def arguments(self, namespace: str = '/') -> list[str]:
         """Return the arguments of the command line, for a graph in a namespace."""
         ros = ['--ros-args', '-r', f'__node:={self.name}', '-r', f'__ns:={namespace}']
-        for key, value in self.parameters.items():
+        own: Mapping[str, Parameter] = {'vehicle': self.vehicle} if self.vehicle else {}
+        for key, value in {**own, **self.parameters}.items():
             # JSON is YAML, which rcl reads: any path stays one text.
             ros += ['-p', f'{key}:={json.dumps(value, ensure_ascii=False, default=str)}']
         return ros

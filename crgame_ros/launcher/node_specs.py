@@ -24,11 +24,10 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
     setup, request = plan.setup, plan.request
     companions = [
         *participant_specs(Participants.from_setup(setup), plan.roster),
-        NodeSpec('recorder_node', 'recorder_node', {'directory': plan.bag},
-                 nice=COMPANION_NICE, restart=True),
-        NodeSpec('drivability_node', 'drivability_node', nice=COMPANION_NICE, restart=True),
-        NodeSpec('timesync_node', 'timesync_node', nice=COMPANION_NICE, restart=True),
-        NodeSpec('criticality_node', 'criticality_node', nice=VIEWER_NICE, restart=True)]
+        NodeSpec('recorder_node', {'directory': plan.bag}, nice=COMPANION_NICE),
+        NodeSpec('drivability_node', nice=COMPANION_NICE),
+        NodeSpec('timesync_node', nice=COMPANION_NICE),
+        NodeSpec('criticality_node', nice=VIEWER_NICE)]
     viewers = _viewer_specs(plan)
     # With a driver in the browser, the run begins when the seat is taken, and step 0 must reach
     # the page.
@@ -38,7 +37,7 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
     folders = [plan.cockpit / 'games']
     if request.game is not None:
         folders.append(request.game.resolve().parent)
-    simulation = NodeSpec('sim_node', 'sim_node', {
+    simulation = NodeSpec('sim_node', {
         'at_end': at_end(request), 'countdown': float(request.countdown_s),
         'folder': plan.folder, 'game': plan.game_file,
         'real_time_factor': float(request.real_time_factor),
@@ -74,31 +73,28 @@ def participant_specs(participants: Participants, roster: Path) -> list[NodeSpec
     """
     code = {'roster': roster}
     specs = [
-        *(NodeSpec('planner_node', f'planner_node_{av}', {'vehicle': av, **code},
-                   nice=COMPANION_NICE, restart=True)
+        *(NodeSpec('planner_node', code, COMPANION_NICE, av)
           for av, planner in participants.avs.items() if planner != EXTERNAL),
-        *(NodeSpec('driver_node', f'driver_node_{human}', {'vehicle': human, **code},
-                   restart=True)
+        *(NodeSpec('driver_node', code, vehicle=human)
           for human, driver in participants.humans.items()
           if driver != COCKPIT and not is_replay(driver)),
-        *(NodeSpec('perception_node', f'perception_node_{av}', {'vehicle': av, **code},
-                   nice=COMPANION_NICE, restart=True) for av in participants.perceiving)]
+        *(NodeSpec('perception_node', code, COMPANION_NICE, av)
+          for av in participants.perceiving)]
     if participants.traffic:
-        specs.append(NodeSpec('traffic_node', 'traffic_node', code, nice=COMPANION_NICE,
-                              restart=True))
+        specs.append(NodeSpec('traffic_node', code, nice=COMPANION_NICE))
     if participants.occupancy:
-        specs.append(NodeSpec('map_node', 'map_node', nice=COMPANION_NICE, restart=True))
+        specs.append(NodeSpec('map_node', nice=COMPANION_NICE))
     if participants.instruments:
-        specs.append(NodeSpec('instruments_node', 'instruments_node', restart=True))
+        specs.append(NodeSpec('instruments_node'))
     return specs
 
 
 def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
     """Return the nodes that may come and go during a run."""
     request = plan.request
-    viewers = [NodeSpec('marker_node', 'marker_node', nice=VIEWER_NICE, restart=True)]
+    viewers = [NodeSpec('marker_node', nice=VIEWER_NICE)]
     if not request.headless:
-        viewers.append(NodeSpec('cockpit_node', 'cockpit_node', {
+        viewers.append(NodeSpec('cockpit_node', {
             'port': request.port, 'listen': cockpit_host(request), 'token': request.token,
             'open_cockpit': request.open_cockpit,
             'certificate': _path(request.certificate), 'key': _path(request.key),
@@ -108,7 +104,7 @@ def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
             'directory': plan.cockpit, 'runs': plan.folder,
             # The files beside a folder that the user named are not shown.
             'archive': plan.folder.parent if request.out is None else ''},
-            nice=COMPANION_NICE, restart=True))
+            nice=COMPANION_NICE))
     return viewers
 
 

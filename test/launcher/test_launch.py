@@ -14,7 +14,7 @@ from crgame_ros.launcher.node_specs import participant_specs, Roster
 from crgame_ros.simulation.roster import Participants
 import pytest
 
-FIRST = NodeSpec('sim_node', 'sim_node')
+FIRST = NodeSpec('sim_node')
 GAME = Participants(humans={}, avs={'av0': 'reactive'}, perceiving=(), traffic=False,
                     occupancy=False, instruments=False)
 
