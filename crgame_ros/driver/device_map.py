@@ -3,11 +3,10 @@
 """Device maps: axes, buttons and keys that drive the vehicle, and limits of a wheel's motor."""
 
 from collections.abc import Mapping, Set
-from dataclasses import dataclass
-from enum import IntEnum
+from dataclasses import dataclass, field
 from pathlib import Path
 import re
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, get_args, Literal
 
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import AxisRange, ControlLayout, GearButtons, LightButtons
@@ -74,6 +73,7 @@ REMEDY = 'see docs/driving.md, section "Add a device"'
 Index = Annotated[int, Within(0, 999)]
 Finite = Annotated[float, Within()]
 Way = Literal['evdev', 'joy']
+Kind = Literal['wheel', 'gamepad', 'keyboard']
 _PEDALS = ('throttle', 'pedals')
 _AXES = OnlyWith(_PEDALS, needed=True)
 
@@ -324,7 +324,7 @@ class KeyEntry:
 
 
 @dataclass(frozen=True)
-class DeviceFile:
+class DeviceMap:
     """
     A device map.
 
@@ -338,13 +338,14 @@ class DeviceFile:
     :param buttons: for the gear, the indicators and the horn.
     :param keys: of a keyboard.
     :param force_feedback: motor of a wheel; without it the wheel is not moved.
+    :ivar name: of the file, without its ending.
     """
 
     FORM: ClassVar[Form] = Form(REMEDY, by='kind', one_of={
         'wheel': _PEDALS, 'gamepad': _PEDALS, 'keyboard': ('keys',)})
 
     title: Annotated[str, Wording(r'[\s\S]+', 'give a text')]
-    kind: Literal['wheel', 'gamepad', 'keyboard']
+    kind: Kind
     match: Annotated[tuple[str, ...], Listed(1)]
     steering: Annotated[AxisPair | None, _AXES] = None
     throttle: Annotated[AxisPair | None, OnlyWith(('throttle',))] = None
@@ -353,6 +354,7 @@ class DeviceFile:
     buttons: Annotated[ButtonEntry | None, _AXES] = None
     keys: Annotated[KeyEntry | None, OnlyWith(('keys',))] = None
     force_feedback: Annotated[ForceLimits | None, OnlyWith(_PEDALS)] = None
+    name: str = field(init=False, default='')
 
     def check(self) -> None:
         """Check that the patterns are regular expressions."""
@@ -382,41 +384,10 @@ class DeviceFile:
             complete(self.brake), complete(self.pedals, True), self.buttons.gears(way),
             self.buttons.lights(way), _codes(self.buttons.put_back, way))
 
-
-class DeviceKind(IntEnum):
-    """Kinds of devices, in the order in which `auto` prefers them."""
-
-    WHEEL = 0
-    GAMEPAD = 1
-    KEYBOARD = 2
-
-
-@dataclass(frozen=True)
-class DeviceMap:
-    """
-    One file of `config/devices/`.
-
-    :param name: the file's name without its ending.
-    :param file: its content.
-    """
-
-    name: str
-    file: DeviceFile
-
     @property
-    def kind(self) -> DeviceKind:
-        """Return whether it is a wheel, a gamepad or a keyboard."""
-        return DeviceKind[self.file.kind.upper()]
-
-    @property
-    def keys(self) -> KeyEntry | None:
-        """Return the keys of a keyboard, as evdev codes; None otherwise."""
-        return self.file.keys
-
-    @property
-    def force(self) -> ForceLimits | None:
-        """Return the motor of a wheel; None where there is none, or it is not to be used."""
-        return self.file.force_feedback
+    def rank(self) -> int:
+        """Return the place of its kind in the order in which `auto` prefers them."""
+        return get_args(Kind).index(self.kind)
 
     def fits(self, name: str, axes: frozenset[int], buttons: frozenset[int]) -> bool:
         """
@@ -426,14 +397,14 @@ class DeviceMap:
         :param axes: its evdev axis codes.
         :param buttons: its evdev key and button codes.
         """
-        if not any(re.search(pattern, name) for pattern in self.file.match):
+        if not any(re.search(pattern, name) for pattern in self.match):
             return False
         if self.keys is not None:
             return self.keys.codes <= buttons
-        bound = (self.file.steering, self.file.throttle, self.file.brake, self.file.pedals)
+        bound = (self.steering, self.throttle, self.brake, self.pedals)
         if not {pair.evdev.axis for pair in bound if pair is not None} <= axes:
             return False
-        return self.kind is not DeviceKind.GAMEPAD or ecodes.BTN_GAMEPAD in buttons
+        return self.kind != 'gamepad' or ecodes.BTN_GAMEPAD in buttons
 
 
 def load_device_maps(directory: Path | None = None) -> tuple[DeviceMap, ...]:
@@ -445,7 +416,7 @@ def load_device_maps(directory: Path | None = None) -> tuple[DeviceMap, ...]:
     """
     folder = directory or config_directory() / 'devices'
     maps = [load_device_map(str(path)) for path in sorted(folder.glob('*.yaml'))]
-    return tuple(sorted(maps, key=lambda device: (device.kind, device.name)))
+    return tuple(sorted(maps, key=lambda device: (device.rank, device.name)))
 
 
 def load_device_map(name: str) -> DeviceMap:
@@ -460,4 +431,6 @@ def load_device_map(name: str) -> DeviceMap:
     if not path.exists():
         known = ', '.join(sorted(known.stem for known in folder.glob('*.yaml')))
         raise InputError('there is no such device map', str(path), f'the maps are {known}')
-    return DeviceMap(path.stem, read(DeviceFile, read_yaml(path, 'device map', REMEDY), str(path)))
+    device = read(DeviceMap, read_yaml(path, 'device map', REMEDY), str(path))
+    object.__setattr__(device, 'name', path.stem)
+    return device

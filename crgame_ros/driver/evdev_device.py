@@ -191,7 +191,7 @@ class EvdevDevice:
     @property
     def force_limits(self) -> ForceLimits | None:
         """Return the limits of its motor; None without one, or where the map has none."""
-        return self.device_map.force if self._can_push and self.device_map else None
+        return self.device_map.force_feedback if self._can_push and self.device_map else None
 
     @property
     def force_device(self) -> 'InputDevice[str] | None':
@@ -276,7 +276,7 @@ class EvdevDevice:
                 gear, self.layout = GearButtons(toggle=frozenset(device_map.keys.reverse)), None
                 lights = device_map.keys.lights
             else:
-                self.layout = device_map.file.layout('evdev', self._limits)
+                self.layout = device_map.layout('evdev', self._limits)
                 gear, lights = self.layout.gear, self.layout.lights
             self.decoder = EventDecoder(gear, self.decoder.reverse, lights)
             self._on_steady_clock = stamp_by_steady_clock(device.fd)
@@ -325,7 +325,7 @@ def _find_device(maps: tuple[DeviceMap, ...], pattern: re.Pattern[str], director
                    and m.fits(device.name, axes, buttons)]
         if fitting:
             # Mice also report keys, but have no LEDs; a device with LEDs is a real keyboard.
-            rank = (fitting[0].kind, ecodes.EV_LED not in has, order)
+            rank = (fitting[0].rank, ecodes.EV_LED not in has, order)
             candidates.append((rank, device, fitting[0]))
         else:
             others.append(device.name)

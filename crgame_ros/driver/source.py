@@ -248,7 +248,7 @@ class JoyDriver(DriverSource):
         if device_map.keys is not None:
             raise InputError('is a keyboard, which has no joy node', device_map.name,
                              'choose the map of a wheel or gamepad')
-        self._layout = device_map.file.layout('joy')
+        self._layout = device_map.layout('joy')
         self.name = device_map.name
         self._heard_s = self._now_s = -math.inf
         self._raw = RawInput()

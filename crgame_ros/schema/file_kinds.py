@@ -212,7 +212,7 @@ FILE_KINDS = {
     'vehicle': FileKind('crgame_ros.vehicle.parameters', 'VehicleParameters', 'Vehicle'),
     'steering': FileKind('crgame_ros.vehicle.steering', 'SteeringRatioTable',
                          'Table of steering ratios'),
-    'device': FileKind('crgame_ros.driver.device_map', 'DeviceFile', 'Device map'),
+    'device': FileKind('crgame_ros.driver.device_map', 'DeviceMap', 'Device map'),
     'timeline': FileKind('crgame_ros.driver.timeline', 'TimelineFile', 'Scripted driver'),
     'occupancy': FileKind('crgame_ros.occupancy.map_file', 'MapEntry', 'Occupancy map'),
     'study': FileKind('crgame_ros.study.file', 'StudyFile', 'Study'),

@@ -90,10 +90,10 @@ class PushedWheel(EvdevDevice):
     def __init__(self, motor: Motor | None, limits: ForceLimits | None = None) -> None:
         device_map = load_device_map('logitech_g29')
         super().__init__((device_map,), directory=Path(gettempdir()) / 'no devices')
-        self.device_map, self.layout = device_map, device_map.file.layout('evdev')
+        self.device_map, self.layout = device_map, device_map.layout('evdev')
         self.decoder = EventDecoder(self.layout.gear)
         self.motor = motor
-        self.limits = limits or device_map.force
+        self.limits = limits or device_map.force_feedback
 
     def turn(self, angle: float) -> None:
         """Turn the wheel to an angle [rad]."""

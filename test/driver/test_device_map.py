@@ -4,12 +4,7 @@
 
 from pathlib import Path
 
-from crgame_ros.driver.device_map import (
-    DeviceKind,
-    DeviceMap,
-    load_device_map,
-    load_device_maps,
-)
+from crgame_ros.driver.device_map import DeviceMap, load_device_map, load_device_maps
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import joy_state, normalize, RawInput
 from crgame_ros.errors import InputError
@@ -37,7 +32,7 @@ def find(name: str, axes: frozenset[int], buttons: frozenset[int]) -> list[str]:
 def test_wheels_come_before_gamepads_before_keyboards() -> None:
     """The order is that of the choice `auto`."""
     maps = load_device_maps()
-    assert [m.kind for m in maps] == sorted(m.kind for m in maps)
+    assert [m.rank for m in maps] == sorted(m.rank for m in maps)
     assert {m.name for m in maps} == {*WHEELS, 'generic_gamepad', 'keyboard'}
 
 
@@ -69,7 +64,7 @@ def test_controls_are_demanded_as_well_as_names() -> None:
 @pytest.mark.parametrize('name', WHEELS)
 def test_wheel_endpoints(name: str) -> None:
     """Raw 0 is full left (450 degrees), 65535 full right; pedals rest at 255 and end at 0."""
-    layout = load_device_map(name).file.layout('evdev', WHEEL_LIMITS)
+    layout = load_device_map(name).layout('evdev', WHEEL_LIMITS)
     gas, brake = {'logitech_g923_xbox': (ecodes.ABS_Y, ecodes.ABS_Z)}.get(
         name, (ecodes.ABS_Z, ecodes.ABS_RZ))
     rest = {ecodes.ABS_X: 32767.5, ecodes.ABS_Y: 255, ecodes.ABS_Z: 255, ecodes.ABS_RZ: 255}
@@ -89,14 +84,14 @@ def test_evdev_and_joy_agree(name: str, limits: dict[int, tuple[float, float]]) 
         axes = {code: low + ((share + 0.37 * code) % 1.0) * (high - low)
                 for code, (low, high) in limits.items()}
         joy = joy_state(axes, (), limits, ())
-        by_joy = normalize(RawInput(dict(enumerate(joy.axes))), device.file.layout('joy'))
-        by_evdev = normalize(RawInput(axes), device.file.layout('evdev', limits))
+        by_joy = normalize(RawInput(dict(enumerate(joy.axes))), device.layout('joy'))
+        by_evdev = normalize(RawInput(axes), device.layout('evdev', limits))
         assert by_joy == pytest.approx(by_evdev, abs=1e-9)
 
 
 def test_gear_buttons_agree_in_evdev_and_joy() -> None:
     """The joy index of a button is its place among the device's buttons."""
-    g29 = load_device_map('logitech_g29').file
+    g29 = load_device_map('logitech_g29')
     buttons = [*range(ecodes.BTN_TRIGGER, ecodes.BTN_DEAD + 1),
                *range(ecodes.BTN_TRIGGER_HAPPY1, ecodes.BTN_TRIGGER_HAPPY9 + 1)]
     for action in ('on', 'off', 'held'):
@@ -140,8 +135,8 @@ def parse_device_map(text: str, folder: Path) -> DeviceMap:
 def test_combined_pedals_are_read(tmp_path: Path) -> None:
     """One axis serves both pedals, with the device's ranges."""
     device = parse_device_map(COMBINED, tmp_path)
-    assert (device.name, device.kind) == ('old', DeviceKind.WHEEL)
-    layout = device.file.layout('evdev', {ecodes.ABS_WHEEL: (0, 100), ecodes.ABS_GAS: (-50, 50)})
+    assert (device.name, device.kind) == ('old', 'wheel')
+    layout = device.layout('evdev', {ecodes.ABS_WHEEL: (0, 100), ecodes.ABS_GAS: (-50, 50)})
     raw = RawInput({ecodes.ABS_WHEEL: 55, ecodes.ABS_GAS: 25})
     assert normalize(raw, layout) == (0.0, 0.5, 0.0, False, 0, False)
     assert layout.gear.toggle == {ecodes.BTN_A}
@@ -190,7 +185,7 @@ def test_maps_of_another_directory(tmp_path: Path) -> None:
     """A user's folder is read the same way."""
     (tmp_path / 'old.yaml').write_text(COMBINED, encoding='utf-8')
     maps: tuple[DeviceMap, ...] = load_device_maps(tmp_path)
-    assert [m.file.title for m in maps] == ['Old wheel']
+    assert [m.title for m in maps] == ['Old wheel']
 
 
 def test_the_documented_example_is_the_g29(tmp_path: Path) -> None:
@@ -199,5 +194,5 @@ def test_the_documented_example_is_the_g29(tmp_path: Path) -> None:
     block = next(b for b in text.split('```yaml')[1:] if b.startswith('\ntitle:'))
     device = parse_device_map(block.split('```')[0], tmp_path)
     g29 = load_device_map('logitech_g29')
-    assert device.file.layout('evdev', WHEEL_LIMITS).ranges \
-        == g29.file.layout('evdev', WHEEL_LIMITS).ranges
+    assert device.layout('evdev', WHEEL_LIMITS).ranges \
+        == g29.layout('evdev', WHEEL_LIMITS).ranges

@@ -43,7 +43,7 @@ def absent(tmp_path: Path, name: str) -> EvdevDevice:
     if device_map.keys is not None:
         device.decoder = EventDecoder(GearButtons(toggle=device_map.keys.reverse))
     else:
-        device.layout = device_map.file.layout('evdev')
+        device.layout = device_map.layout('evdev')
         device.decoder = EventDecoder(device.layout.gear)
     return device
 

@@ -187,7 +187,7 @@ def test_a_killed_process_leaves_no_force() -> None:
 def test_maps_say_what_their_motor_holds(tmp_path: Path) -> None:
     """Only maps of shipped wheels have a motor; values out of bounds are refused."""
     for device_map in load_device_maps():
-        assert (device_map.force is not None) == (device_map.kind.name == 'WHEEL')
+        assert (device_map.force_feedback is not None) == (device_map.kind == 'wheel')
     text = (ROOT / 'config/devices/logitech_g29.yaml').read_text()
     path = tmp_path / 'm.yaml'
     for wrong in ('max_torque: 0', 'max_torque: 2.1, cap: 1.5', 'max_torque: 2.1, slew: 0',

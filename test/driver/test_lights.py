@@ -115,7 +115,7 @@ def test_an_unknown_key_is_refused_with_the_known_ones() -> None:
 def test_every_shipped_map_has_indicators_and_horn() -> None:
     """Each map has all four functions, each once, and on no button that changes the gear."""
     for device_map in load_device_maps():
-        keys, buttons = device_map.keys, device_map.file.buttons
+        keys, buttons = device_map.keys, device_map.buttons
         functions: list[tuple[LightButtons, GearButtons | None]] = \
             [(keys.lights, None)] if keys is not None else []
         if buttons is not None:
