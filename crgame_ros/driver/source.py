@@ -35,12 +35,11 @@ JOY_TIMEOUT_S = 0.5
 # A driver in the browser; the cockpit node publishes the commands of the seat itself.
 COCKPIT = 'cockpit'
 
+# The forms of each kind of source.
 _FORMS = {
-    'auto': 'auto', 'cockpit': 'cockpit', 'idle': 'idle', 'evdev': 'evdev or evdev:NAME',
-    'keys': 'keys:FILE', 'joy': 'joy or joy:FILE', 'replay': 'replay:BAG',
-    'policy': 'policy:FILE.py:load'}
-_WITHOUT_ARGUMENT = {'auto', 'cockpit', 'idle', 'evdev', 'joy'}
-_WITH_ARGUMENT = {'evdev', 'keys', 'joy', 'replay', 'policy'}
+    'auto': ('auto',), COCKPIT: (COCKPIT,), 'idle': ('idle',), 'evdev': ('evdev', 'evdev:NAME'),
+    'keys': ('keys:FILE',), 'joy': ('joy', 'joy:FILE'), 'replay': ('replay:BAG',),
+    'policy': ('policy:FILE.py:load',)}
 
 
 @dataclass(frozen=True)
@@ -74,11 +73,12 @@ def parse_source(text: str) -> SourceSpec:
     """
     kind, colon, argument = text.strip().partition(':')
     argument = argument.strip()
-    if bool(colon) == bool(argument) and kind in (
-            _WITH_ARGUMENT if argument else _WITHOUT_ARGUMENT):
+    has_argument = bool(argument)
+    if bool(colon) == has_argument and any(
+            (':' in form) == has_argument for form in _FORMS.get(kind, ())):
         return SourceSpec(kind, argument)
     raise InputError(f'there is no driver source {text!r}', 'driver',
-                     f'give one of {", ".join(_FORMS.values())}')
+                     f'give one of {", ".join(map(" or ".join, _FORMS.values()))}')
 
 
 def is_replay(text: str) -> bool:
