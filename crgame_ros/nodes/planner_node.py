@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """planner_node: one AV's planner in its own process (CRG III-B, the worker of algorithm 2)."""
 
+from functools import partial
 import gc
 import math
 import time
@@ -58,9 +59,8 @@ class PlannerNode(Node):
         self._scenario: ScenarioSet | None = None
         self._time = RunTime()
         self._subscriptions_kept = [
-            endpoints.subscription('/scenario/xml', self._on_xml),
-            endpoints.subscription('/scenario/objects', self._on_objects),
-            endpoints.subscription('/scenario/game', self._on_game),
+            *(endpoints.subscription(f'/scenario/{kind}', partial(self._on_document, kind))
+              for kind in ('xml', 'objects', 'game')),
             endpoints.subscription('/timing/frame_skip', self._on_frame_skip),
             # Before the requests, because an event may change the planner that answers them.
             endpoints.subscription('/scenario/events', self._on_events),
@@ -69,15 +69,6 @@ class PlannerNode(Node):
     def run(self, stop: StopFlag) -> None:
         """Serve requests until asked to stop."""
         spin(self, stop)
-
-    def _on_xml(self, message: String) -> None:
-        self._receive_document('xml', message.data)
-
-    def _on_objects(self, message: String) -> None:
-        self._receive_document('objects', message.data)
-
-    def _on_game(self, message: String) -> None:
-        self._receive_document('game', message.data)
 
     def _on_events(self, message: String) -> None:
         try:
@@ -97,9 +88,9 @@ class PlannerNode(Node):
     def _on_frame_skip(self, message: Bool) -> None:
         self._frames_skipped = message.data
 
-    def _receive_document(self, kind: str, text: str) -> None:
+    def _on_document(self, kind: str, message: String) -> None:
         try:
-            self._documents.add(kind, text)
+            self._documents.add(kind, message.data)
         except InputError as error:
             # The previous game goes on.
             self._refusals.note(f'/scenario/{kind}', str(error))
