@@ -6,14 +6,13 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from crgame_ros.messages.status_values import Status, WARN
+from crgame_ros.messages.status_values import OK, Status, WARN
 from crgame_ros.nodes.sim.inputs import SimInputs
-from crgame_ros.nodes.sim.outputs import SimOutputs
+from crgame_ros.ros.diagnostics import Diagnostics
 from crgame_ros.ros.seats import Seat
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.engine import Simulation
 from crgame_ros.simulation.run_messages import plans_status, refusal_status
-from diagnostic_msgs.msg import DiagnosticStatus
 
 # Refusals published as they happen, between two reports: a flood must not cost the cycle.
 MAX_REFUSALS_PER_REPORT = 5
@@ -22,13 +21,19 @@ MAX_REFUSALS_PER_REPORT = 5
 class LiveDiagnostics:
     """The reports of sim_node: every second, one subject per step; refusals at once."""
 
-    def __init__(self, outputs: SimOutputs, simulation: Simulation, inputs: SimInputs) -> None:
-        self._outputs = outputs
+    def __init__(self, diagnostics: Diagnostics, simulation: Simulation,
+                 inputs: SimInputs) -> None:
+        self._diagnostics = diagnostics
         self._simulation = simulation
         self._inputs = inputs
         self._refusals = 0
         # Reports on the past second that are still to be published.
         self._waiting: deque[Callable[[], None]] = deque()
+
+    def tell(self, status: Status) -> None:
+        """Publish a status of the present step."""
+        self._diagnostics.publish_status(
+            status, self._simulation.scheduler.stamp_ns(self._simulation.n))
 
     def refusal(self, av_id: str, reason: str) -> None:
         """Publish why a plan was refused."""
@@ -36,18 +41,15 @@ class LiveDiagnostics:
 
     def run_state(self, values: Mapping[str, object]) -> None:
         """Publish whether the run is waiting, running, paused or ended (`state_values`)."""
-        simulation, more = self._simulation, dict(values)
-        state = str(more.pop('state'))
-        self._outputs.publish_diagnostics(
-            'run', DiagnosticStatus.OK, state,
-            {'n': simulation.n, 'k': simulation.scheduler.k(simulation.n), **more},
-            simulation.scheduler.stamp_ns(simulation.n))
+        n, more = self._simulation.n, dict(values)
+        self.tell(Status.of('sim_node: run', OK, str(more.pop('state')),
+                            {'n': n, 'k': self._simulation.scheduler.k(n), **more}))
 
-    def late_traffic(self, n: int, k: int, agents_k: int) -> None:
+    def late_traffic(self, k: int, agents_k: int) -> None:
         """Publish that the agents of an earlier tick were used."""
-        self._outputs.publish_diagnostics(
-            'traffic', DiagnosticStatus.WARN, f'agents are {k - agents_k} scenario steps late',
-            {'n': n, 'k': k, 'agents_k': agents_k}, self._simulation.scheduler.stamp_ns(n))
+        self.tell(Status.of(
+            'sim_node: traffic', WARN, f'agents are {k - agents_k} scenario steps late',
+            {'n': self._simulation.n, 'k': k, 'agents_k': agents_k}))
 
     def event_refused(self, name: str, reason: str) -> None:
         """Publish why a trigger had no effect."""
@@ -62,11 +64,7 @@ class LiveDiagnostics:
     def _refused(self, status: Status) -> None:
         self._refusals += 1
         if self._refusals <= MAX_REFUSALS_PER_REPORT:
-            self._outputs.publish_status(status, self._stamp_ns)
-
-    @property
-    def _stamp_ns(self) -> int:
-        return self._simulation.scheduler.stamp_ns(self._simulation.n)
+            self.tell(status)
 
     def publish(self) -> None:
         """Report on every AV and seat."""
@@ -89,13 +87,11 @@ class LiveDiagnostics:
         return True
 
     def _publish_plans(self, av: AutonomousVehicle) -> None:
-        self._outputs.publish_status(plans_status(
-            av, self._simulation.n, self._simulation.scheduler.dt_s), self._stamp_ns)
+        self.tell(plans_status(av, self._simulation.n, self._simulation.scheduler.dt_s))
 
     def _publish_seat(self, seat: Seat) -> None:
-        self._outputs.publish_diagnostics(
-            f'{seat.id} seat', DiagnosticStatus.WARN if seat.lost else DiagnosticStatus.OK,
+        self.tell(Status.of(
+            f'sim_node: {seat.id} seat', WARN if seat.lost else OK,
             'driver lost' if seat.lost else 'driven',
             {'source': seat.source, 'losses': seat.losses, 'malformed': seat.malformed,
-             'outdated': seat.outdated, 'passed_over': seat.passed_over},
-            self._simulation.scheduler.stamp_ns(self._simulation.n))
+             'outdated': seat.outdated, 'passed_over': seat.passed_over}))

@@ -134,7 +134,8 @@ class LiveRun:
         self._pacer = Pacer(lambda: self._serve(0.0), self._controller, self._dt_s,
                             setup.game.timing.max_catch_up_steps)
         self._watch = StepWatch()
-        self._diagnostics = LiveDiagnostics(self._outputs, self.simulation, self._inputs)
+        self._diagnostics = LiveDiagnostics(Endpoints(node).diagnostics, self.simulation,
+                                            self._inputs)
         self._failures = {av.id: FailureLines(av.id, node.get_logger().warning)
                           for av in setup.avs}
         self._state = RunState(self._outputs, self.simulation, self._diagnostics, control)
@@ -269,8 +270,7 @@ class LiveRun:
             return
         vehicle_id, violation_n = stop
         n = self.simulation.n
-        self._outputs.publish_status(stop_status(vehicle_id, violation_n, n),
-                                     self.simulation.scheduler.stamp_ns(n))
+        self._diagnostics.tell(stop_status(vehicle_id, violation_n, n))
         self._node.get_logger().warning(
             f'{vehicle_id} violates drivability (n = {violation_n}): stopping at n = {n}')
         self._control.stop_wanted = True
@@ -413,7 +413,7 @@ class LiveRun:
     def _at_tick(self, result: StepResult) -> None:
         """Do the work of a scenario tick."""
         if result.agents_k is not None and result.agents_k < result.k:
-            self._diagnostics.late_traffic(result.n, result.k, result.agents_k)
+            self._diagnostics.late_traffic(result.k, result.agents_k)
         order = self._inputs.frame_skip_order()
         if order is not None:
             self._outputs.frames_skipped = order and self._setup.game.timing.frame_skipping

@@ -18,7 +18,6 @@ from crgame_ros.messages.joints import (
     vehicle_joint_names,
     vehicle_to_joints,
 )
-from crgame_ros.messages.status_values import Status
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import EXACT_VARIANCE, SeriesMessage, set_time, StateMessage
 from crgame_ros.simulation.engine import Simulation, StepResult
@@ -265,15 +264,6 @@ class SimOutputs:
             self._cycle_message.layout.dim[0].stride = self.rows.count * len(self.rows.columns)
             self._cycle_message.data = self.rows.taken()
             self._cycle.publish(self._cycle_message)
-
-    def publish_diagnostics(self, name: str, level: bytes, text: str,
-                            values: dict[str, object], stamp_ns: int) -> None:
-        """Publish one status."""
-        self._diagnostics.publish(f'sim_node: {name}', level, text, values, stamp_ns)
-
-    def publish_status(self, status: Status, stamp_ns: int) -> None:
-        """Publish one status as it is."""
-        self._diagnostics.publish_status(status, stamp_ns)
 
     def missing(self, companions: Sequence[str]) -> set[str]:
         """
