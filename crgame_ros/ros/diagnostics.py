@@ -31,20 +31,13 @@ class Diagnostics:
         # Latest simulation time that the node has received [ns]; 0 means none, as in ROS.
         self.now_ns = 0
 
-    def array(self, name: str, level: bytes, text: str, values: Mapping[str, object],
-              stamp_ns: int | None = None) -> DiagnosticArray:
+    def array_of(self, status: Status, stamp_ns: int | None = None) -> DiagnosticArray:
         """
         Build a message of one status.
 
-        :param name: node and subject, `<node>: <subject>`.
-        :param level: OK, WARN or ERROR.
         :param stamp_ns: simulation time of the status; the latest that the node has received where
             None [ns]
         """
-        return self.array_of(Status.of(name, level[0], text, values), stamp_ns)
-
-    def array_of(self, status: Status, stamp_ns: int | None = None) -> DiagnosticArray:
-        """Build a message of one status, as `array` does."""
         if stamp_ns is not None:
             self.now_ns = stamp_ns
         message = DiagnosticArray(status=[DiagnosticStatus(
@@ -56,11 +49,17 @@ class Diagnostics:
 
     def publish(self, name: str, level: bytes, text: str, values: Mapping[str, object],
                 stamp_ns: int | None = None) -> None:
-        """Publish one status on `/diagnostics`; parameters as of `array`."""
-        self.publisher.publish(self.array(name, level, text, values, stamp_ns))
+        """
+        Publish one status on `/diagnostics`.
+
+        :param name: node and subject, `<node>: <subject>`.
+        :param level: OK, WARN or ERROR.
+        :param stamp_ns: as of `array_of`.
+        """
+        self.publish_status(Status.of(name, level[0], text, values), stamp_ns)
 
     def publish_status(self, status: Status, stamp_ns: int | None = None) -> None:
-        """Publish one status on `/diagnostics`, as `publish` does."""
+        """Publish one status on `/diagnostics`; parameters as of `array_of`."""
         self.publisher.publish(self.array_of(status, stamp_ns))
 
 
