@@ -131,14 +131,18 @@ class PolledSubscription(Generic[T]):
         data, info = taken
         return data, int(info['source_timestamp']), int(info['received_timestamp'])
 
-    def waiting(self) -> Iterator[T]:
-        """Remove and yield the waiting messages; those that come meanwhile may have to wait."""
-        return (message for message, _, _ in self.waiting_timed())
+    def waiting(self, most: int | None = None) -> Iterator[T]:
+        """
+        Remove and yield the waiting messages; those that come meanwhile may have to wait.
 
-    def waiting_timed(self) -> Iterator[tuple[T, int, int]]:
+        :param most: of them; None: as many as the queue holds.
+        """
+        return (message for message, _, _ in self.waiting_timed(most))
+
+    def waiting_timed(self, most: int | None = None) -> Iterator[tuple[T, int, int]]:
         """Yield what `waiting` does, with the times of publication and reception."""
         # More than the queue holds come only where somebody publishes faster than they are read.
-        for _ in range(self.subscription.qos_profile.depth):
+        for _ in range(self.subscription.qos_profile.depth if most is None else most):
             taken = self.pop_timed()
             if taken is None:
                 return

@@ -337,10 +337,7 @@ class Seats:
         :return: whether anything changed, and the reasons of refusals
         """
         changed, refusals = False, []
-        for _ in range(MAX_ORDERS):
-            message = self._orders.pop()
-            if message is None:
-                break
+        for message in self._orders.waiting(MAX_ORDERS):
             try:
                 changed |= self._obey(message.data, now_ns)
             except InputError as error:

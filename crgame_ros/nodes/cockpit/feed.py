@@ -133,12 +133,7 @@ class AvFeed:
 
     def _send_scans(self, frames: MessageFrames, av: str) -> None:
         slot = self._slots['/<av>/scan', av]
-        newest = {}
-        for _ in range(SCAN_DEPTH):
-            message = slot.pop()
-            if message is None:
-                break
-            newest[message.header.frame_id] = message
+        newest = {message.header.frame_id: message for message in slot.waiting()}
         for message in newest.values():
             place = frames.place_of(message)
             scan = None if place is None else frames.scan(place, av, message)
@@ -344,10 +339,7 @@ class CockpitFeed:
                 'running': state.running, 'open': [asdict(prompt) for prompt in state.open]})
 
     def _poll_criticality(self) -> None:
-        for _ in range(QUEUE):
-            message = self._criticality.pop()
-            if message is None:
-                return
+        for message in self._criticality.waiting():
             if self._frames is not None \
                     and (frame := self._frames.criticality(message)) is not None:
                 self._hub.send_frame(*frame)
@@ -368,10 +360,7 @@ class CockpitFeed:
     def _poll_diagnostics(self) -> None:
         for slot in (self._diagnostics, *self._verdicts.values()):
             # The rest of a flood waits for the next call.
-            for _ in range(QUEUE):
-                message = slot.pop()
-                if message is None:
-                    break
+            for message in slot.waiting(QUEUE):
                 stamp_ns = from_time(message.header.stamp)
                 for status in message.status:
                     self._add_status(status, stamp_ns)

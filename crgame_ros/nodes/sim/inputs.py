@@ -148,10 +148,7 @@ class SimInputs:
 
     def triggers(self) -> list[str]:
         """Return the names of triggered events; the rest of a flood waits."""
-        names: list[str] = []
-        while len(names) < MAX_TRIGGERS and (message := self._triggers.pop()) is not None:
-            names.append(str(message.data))
-        return names
+        return [str(message.data) for message in self._triggers.waiting(MAX_TRIGGERS)]
 
     def pass_task_reports(self, take: Callable[[TaskReport], str | None]) -> None:
         """
@@ -159,10 +156,9 @@ class SimInputs:
 
         :param take: returns the reason for which it refuses a report, else None.
         """
-        for _ in range(MAX_REPORTS):
-            message = None if self._task_reports is None else self._task_reports.pop()
-            if message is None:
-                return
+        if self._task_reports is None:
+            return
+        for message in self._task_reports.waiting(MAX_REPORTS):
             try:
                 reason = take(TASK_REPORT.read(message.data))
             except InputError as error:
