@@ -42,11 +42,7 @@ class ForceLimits:
 
 
 class TorqueLimiter:
-    """
-    A limiter that keeps a torque within cap and slew.
-
-    :param limits: of the motor.
-    """
+    """A limiter that keeps a torque within cap and slew."""
 
     def __init__(self, limits: ForceLimits) -> None:
         self.limits = limits

@@ -110,8 +110,6 @@ class SteeringTorque:
     alpha_f = alpha_r + delta - L (dpsi/dt) / v, where alpha_r is that of a steady turn: it carries
     F = m a l_r / L with a = v dpsi/dt, by the inverted brush model. The other terms are the angle
     by which the driver's wheel leads the vehicle's path.
-
-    :param vehicle: parameters of the vehicle.
     """
 
     def __init__(self, vehicle: VehicleParameters,
@@ -252,7 +250,6 @@ class ForceFeedback:
     The force of one device, without a clock of its own.
 
     :param device: the wheel; it may be absent, come and go.
-    :param vehicle: that it steers.
     """
 
     def __init__(self, device: EvdevDevice, vehicle: VehicleParameters) -> None:

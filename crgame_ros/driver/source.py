@@ -190,8 +190,6 @@ class ScriptedDriver(DriverSource):
     Cycle n gets the keys or axes at its start, t = n * dt; keys go through the keyboard filter
     advanced over that cycle (CRG 18-19), axes through the normalisation (CRG 17). A driver that
     joins at a later cycle first computes all earlier ones.
-
-    :param timeline: of keys or of axes.
     """
 
     def __init__(self, timeline: Timeline) -> None:

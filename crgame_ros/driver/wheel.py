@@ -40,11 +40,7 @@ NO_LIGHTS = LightButtons()
 
 
 class IndicatorLever:
-    """
-    The lights switched on by presses of buttons; an indicator goes off after the turn.
-
-    :param buttons: of each function.
-    """
+    """The lights switched on by presses of buttons; an indicator goes off after the turn."""
 
     def __init__(self, buttons: LightButtons = NO_LIGHTS) -> None:
         self._buttons = buttons

@@ -46,8 +46,6 @@ class Inlet:
     """
     One stream.
 
-    :param info: as the resolver has found it.
-    :param number: of the stream.
     :ivar described: whether names and units of its channels have come.
     :ivar lost: whether the stream is gone, and not recovered by liblsl.
     """
@@ -138,10 +136,8 @@ class Inlets:
     """
     All streams that a game names, whenever they come.
 
-    :param specs: which.
     :param own: ids of the streams that this run sends, which are not recorded.
     :param first: number of the first stream.
-    :param say: takes one line for people.
     :ivar changed: whether the streams have changed since their owner has reset it.
     """
 

@@ -25,7 +25,6 @@ class Marker(NamedTuple):
     """
     What has happened.
 
-    :param text: its words.
     :param n: simulation step at which it happened; None: at the newest.
     :param after_s: wall time from that step to when it happened [s]
     :param steady_s: when it happened, on the machine's steady clock, where a page has told it [s];
@@ -39,11 +38,7 @@ class Marker(NamedTuple):
 
 
 class RunMarkers:
-    """
-    The markers of one run; each thing is told once, though documents repeat it.
-
-    :param epoch: of the run.
-    """
+    """The markers of one run; each thing is told once, though documents repeat it."""
 
     def __init__(self, epoch: int) -> None:
         self._epoch = epoch

@@ -95,7 +95,6 @@ class Channel:
     """
     A channel of a stream.
 
-    :param name: of it.
     :param unit: of its values, SI; `normalized` for a bare number.
     :param what: kind of quantity.
     """
@@ -110,9 +109,7 @@ class StreamDescription:
     """
     A stream.
 
-    :param name: of it.
     :param type: kind of its content.
-    :param channels: of it.
     :param rate_hz: nominal; 0 if it is irregular [Hz]
     :param texts: whether its values are texts.
     """
@@ -159,7 +156,6 @@ class Outlet:
     """
     A stream.
 
-    :param stream: its description.
     :param domain: the ROS domain: two runs on one machine send different streams.
     :param local: whether it stays on this machine.
     :raises CrgameError: if it cannot.

@@ -114,7 +114,6 @@ class TriggerSender:
 
     A line that cannot be opened, or fails, is told and tried again.
 
-    :param spec: of the line.
     :param say: takes one line of text about a failure, and about its end.
     """
 

@@ -29,7 +29,6 @@ class Finisher:
     It would slow down a run in progress, so after a reset it waits for the next end.
 
     :param session: folder of the session, the same as that of its first run.
-    :param say: prints one line.
     :param reports: whether each run gets a report, once its other files are written.
     """
 

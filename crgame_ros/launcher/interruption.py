@@ -53,7 +53,6 @@ def writing(tell: Callable[[str], None], warning: str = _RECOVERED) -> Iterator[
     """
     Protect the writing of a run's files from the first signal; a second one ends it.
 
-    :param tell: prints one line.
     :param warning: printed at the first signal.
     """
     heard = 0

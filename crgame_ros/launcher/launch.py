@@ -52,10 +52,8 @@ class Graph:
     The nodes of a graph, which run until the simulation ends or a signal comes.
 
     :param specs: the nodes; the end of the first one ends the run.
-    :param say: prints one line.
     :param roster: lists further vehicles, which get their nodes.
     :param finisher: finishes the recordings of runs that are over.
-    :param namespace: of all nodes.
     """
 
     def __init__(self, specs: Sequence[NodeSpec], say: Callable[[str], None],

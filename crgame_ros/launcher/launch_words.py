@@ -20,7 +20,6 @@ class LaunchArgument:
     One argument, made from an option of run.sh. Its default is an empty text: not given.
 
     :param option: of run.sh, '' for the game.
-    :param what: its meaning.
     :param flag: whether it is true or false.
     :param several: whether values are separated by commas; the option is given once for each.
     """

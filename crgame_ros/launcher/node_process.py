@@ -72,9 +72,6 @@ class NodeProcess:
     """
     A running node whose output is read line by line.
 
-    :ivar pid: process id.
-    :ivar output: of the node.
-
     It has its own process group, so that Ctrl-C reaches the launcher only, which ends the nodes in
     good order. If the launcher is killed, the kernel ends the node (`die_with_parent`). A stopped
     node is woken for that, because its process group is orphaned.
@@ -158,7 +155,6 @@ def _fork_node(module: str, arguments: Sequence[str], nice: int) -> tuple[int, i
     Start a node in a process group of its own.
 
     :param module: of the node; its `main` is called.
-    :param arguments: its command line.
     :param nice: its niceness, to give the simulation priority.
     :return: process id, and a descriptor from which its output is read.
     """

@@ -117,8 +117,6 @@ class Roster:
     The vehicles of the present game, as sim_node writes them into a file.
 
     A game chosen in the cockpit may have other vehicles than the first one.
-
-    :param path: of the file.
     """
 
     def __init__(self, path: Path) -> None:

@@ -43,7 +43,6 @@ class RunPlan:
     """
     A run that can be started.
 
-    :param request: of the user.
     :param setup: the run, loaded and checked.
     :param folder: of its files; exists.
     """

@@ -21,7 +21,6 @@ def write_run_report(finished: 'FinishedRecording', say: Callable[[str], object]
 
     A failure is only reported, because it must not harm the run.
 
-    :param say: prints one line.
     :param progress: whether to report progress where it takes long.
     """
     folder = finished.bag.parent

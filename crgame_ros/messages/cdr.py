@@ -92,7 +92,6 @@ def message_header(data: bytes, where: str) -> tuple[int, str]:
     """
     Read the std_msgs/Header with which a message begins.
 
-    :param data: the serialised message.
     :param where: topic for messages.
     :return: stamp [ns] and frame
     :raises InputError: if there is none.

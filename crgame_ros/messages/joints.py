@@ -268,7 +268,6 @@ class WorldMessages:
     """
     A reader of the states of one run's vehicles and objects.
 
-    :param descriptions: of the run.
     :ivar vehicles: ids of the V driven vehicles, in order.
     :ivar objects: ids of the M others, in order.
     """

@@ -63,7 +63,6 @@ class RunStreams:
     """
     The streams of one run, sent with the times of its steps.
 
-    :param game: the run.
     :param outlets: by stream's name; empty if nothing is sent.
     """
 

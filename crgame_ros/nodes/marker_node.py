@@ -217,11 +217,7 @@ def vehicle_transforms(vehicle_ids: Sequence[str], poses: Iterable[Iterable[floa
 
 
 def sensor_transforms(avs: Iterable[DrivenAv], stamp_ns: int) -> list[TransformStamped]:
-    """
-    Return the pose of each AV's sensors, `<av>/<sensor>`, on its `base_link`.
-
-    :param avs: of the game document.
-    """
+    """Return the pose of each AV's sensors, `<av>/<sensor>`, on its `base_link`."""
     return [transform(f'{av.id}/base_link', f'{av.id}/{sensor.name}',
                       sensor.mount(av.vehicle.rear_to_center, av.vehicle.length), stamp_ns)
             for av in avs if av.perception is not None for sensor in av.perception.sensors]
@@ -232,8 +228,6 @@ class Transforms:
     The topics `/tf` and `/tf_static`, where `tf2_msgs` is installed.
 
     It is in every ROS installation, but not among the wheels.
-
-    :param endpoints: of the node.
     """
 
     def __init__(self, endpoints: Endpoints) -> None:

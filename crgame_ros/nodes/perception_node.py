@@ -154,12 +154,7 @@ class PerceptionNode(Node):
 
 
 class LocalizationMessage:
-    """
-    The estimated pose and speed with their covariance.
-
-    :param endpoints: of the node.
-    :param av_id: the AV.
-    """
+    """The estimated pose and speed with their covariance."""
 
     def __init__(self, endpoints: Endpoints, av_id: str) -> None:
         self._publisher = endpoints.publisher('/<av>/localization', av_id)
@@ -193,12 +188,7 @@ def _at_least(known: Array, place: tuple[NDArray[np.intp], ...], part: Array) ->
 
 
 class ScanMessages:
-    """
-    The scans of the sensors: the hits of their rays.
-
-    :param endpoints: of the node.
-    :param av_id: the AV.
-    """
+    """The scans of the sensors: the hits of their rays."""
 
     def __init__(self, endpoints: Endpoints, av_id: str) -> None:
         self._publisher = endpoints.publisher('/<av>/scan', av_id)

@@ -184,7 +184,6 @@ def refuse_another(node: Node, until_s: float) -> None:
     On this machine a lock ensures that (`namespace_lock`); this check covers other machines and
     users.
 
-    :param node: in the namespace in question.
     :param until_s: until when others may be discovered, on the steady clock.
     :raises InputError: if another one publishes.
     """

@@ -40,7 +40,6 @@ class Localisation:
     the last one.
 
     :param spec: noise, bias and rates
-    :param seed: of the noise
     :param name: of the vehicle, so that its noise is independent
     :param initial: true state at step n
     :param dt_s: simulation step [s]

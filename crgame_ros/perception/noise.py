@@ -30,7 +30,6 @@ class KeyedNoise:
     whose key is seed and name. A row therefore depends on (seed, name, n) only: a step that is
     left out changes no other.
 
-    :param seed: of the run
     :param name: of the stream; streams of different names are independent
     :param width: normal numbers in a row
     :param block: steps generated at once; larger is cheaper where every step is used

@@ -129,14 +129,11 @@ class Perception:
     that an error of localisation shifts all of them alike.
 
     :param av_id: av0, …
-    :param spec: from the game
     :param descriptions: driven vehicles in their order, then objects
-    :param vehicle: parameters of the AV
     :param transform: from simulation to the AV's scenario coordinates (CRG 6-8)
     :param initial: true state of the AV at step n
     :param seed: the game's, for a specification without a seed of its own
     :param dt_s: simulation step [s]
-    :param occupancy: permanent obstacles
     :param n: simulation step at which it begins
     :raises InputError: if a sensor cannot be created, or sees too far for the map of permanent
         obstacles.

@@ -177,10 +177,7 @@ class MountedSensor:
     """
     One sensor of an AV.
 
-    :param spec: its kind and mounting
-    :param vehicle: that carries it
     :param count: number of things that can appear
-    :param seed: of its noise
     :param name: of the vehicle, which makes its noise its own
     :param dt_s: simulation step [s]
     """

@@ -20,9 +20,6 @@ class Diagnostics:
     The statuses of one node, stamped with simulation time.
 
     `hardware_id` is the full name of the publishing node, with its namespace.
-
-    :param node: that publishes.
-    :param publisher: of `/diagnostics`.
     """
 
     def __init__(self, node: Node, publisher: Publisher) -> None:

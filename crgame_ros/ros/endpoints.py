@@ -73,7 +73,6 @@ class PolledSubscription(Generic[T]):
     1 µs, waking an executor 200-400 µs.
 
     :param subscription: to serialised messages.
-    :param name: of the topic.
     :param read: converts a serialised message for the owner, or raises InputError.
     :param refuse: called with each unusable message, which is then skipped; without it such
         a message raises InputError.
@@ -272,7 +271,6 @@ class NodeReport:
     """
     The durations of pieces of work, and a status published once a second.
 
-    :param endpoints: of the node.
     :param name: of the status: node and subject.
     """
 

@@ -17,9 +17,6 @@ class HeardTopics:
     A message that comes before the bag of its run is open is recorded with the previous run, if
     there is one. And two companions may not have discovered each other yet, though the simulation
     has discovered both. The recording would then lack the messages of one.
-
-    :param endpoints: of sim_node.
-    :param clock_offset_ns: of the run [ns]
     """
 
     def __init__(self, endpoints: Endpoints, clock_offset_ns: int) -> None:

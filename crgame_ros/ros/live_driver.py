@@ -51,9 +51,7 @@ def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str,
 
     :param text: source as the game or the parameter names it.
     :param timeline: text of the timeline, if the game carries it.
-    :param vehicle_id: for messages.
     :param joy_map: device map for an external joy node.
-    :param say: logs a line for the user.
     :param world: returns the world of a policy.
     :raises InputError: if the source is unusable, or is a recording: recorded commands belong to
         fixed cycles, while messages arrive at any time.
@@ -87,10 +85,7 @@ class LiveForce:
     """
     The force of a seat's wheel, updated from the messages of sim_node and drivability_node.
 
-    :param endpoints: of the node.
-    :param vehicle_id: of the seat.
     :param driving: returns whether the wheel drives the seat now.
-    :param say: logs a line for the user.
     """
 
     def __init__(self, endpoints: Endpoints, vehicle_id: str, driving: Callable[[], bool],
@@ -105,11 +100,7 @@ class LiveForce:
         self._ended = threading.Event()
 
     def begin(self, device: EvdevDevice, vehicle: VehicleParameters) -> None:
-        """
-        Start the force on a device's wheel, unless the device has no motor.
-
-        :param vehicle: that it steers.
-        """
+        """Start the force on a device's wheel, unless the device has no motor."""
         self.end()
         if device.connected and device.force_limits is None:
             return
@@ -167,12 +158,7 @@ class LiveForce:
 
 
 class DeviceDelay:
-    """
-    The delay since an input's time stamp, on the steady clock of this machine.
-
-    :param diagnostics: of the node.
-    :param vehicle_id: of the seat.
-    """
+    """The delay since an input's time stamp, on the steady clock of this machine."""
 
     def __init__(self, diagnostics: Diagnostics, vehicle_id: str) -> None:
         self._diagnostics = diagnostics
@@ -198,7 +184,6 @@ class DeviceDelay:
 
         :param now_s: steady clock [s]
         :param n: the cycle, whose state is known.
-        :param device: that drives.
         """
         self._states.stepped(now_s, n)
         if not self._commands_ms or now_s - self._told_s < _TELL_PERIOD_S:

@@ -18,8 +18,6 @@ class LivePolicyDriver(DriverSource):
     device.
 
     :param name: `FILE.py:load`.
-    :param vehicle_id: of the seat.
-    :param world: of the node.
     :raises InputError: if there is no such policy.
     """
 

@@ -181,12 +181,7 @@ CHECKS: Mapping[str, Callable[[object, Topic], None]] = {
 
 
 class Refusals:
-    """
-    The counts of a node's refusals by topic, published on /diagnostics.
-
-    :param node: that refuses.
-    :param diagnostics: of the node; used once a second at most.
-    """
+    """The counts of a node's refusals by topic, published on /diagnostics."""
 
     def __init__(self, node: Node, diagnostics: Diagnostics) -> None:
         self._node = node

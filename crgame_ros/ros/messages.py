@@ -53,11 +53,7 @@ def to_joint_trajectory(series: JointSeries) -> JointTrajectory:
 
 
 class StateMessage:
-    """
-    A JointTrajectory of one point, built once and refilled in place.
-
-    :param names: joint names.
-    """
+    """A JointTrajectory of one point, built once and refilled in place."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self.message = JointTrajectory(joint_names=list(names))
@@ -83,7 +79,6 @@ class SeriesMessage:
 
     Building a new one costs 10 µs per point, refilling 1 µs.
 
-    :param names: joint names.
     :param times_ns: (P) time from the stamp of each point [ns]
     """
 

@@ -67,7 +67,6 @@ def write_run_profile(path: Path, namespace: str, humans: Collection[str] = (),
     Write the profile of one run, which begins with the default one.
 
     :param path: of the file, which only its owner may read.
-    :param namespace: of the run's nodes.
     :param humans: ids of the humans' vehicles, beside hv0 and so on with the first NUMBERS.
     :param avs: likewise of the AVs.
     :param own_orders: whether this holds for orders as well: services, and ORDER_TOPICS.
@@ -104,8 +103,6 @@ def check_profile(path: Path, namespace: str, own_orders: bool) -> None:
     """
     Check that a profile is one of a run.
 
-    :param path: of the file.
-    :param namespace: of the run's nodes.
     :param own_orders: whether it has to hold for orders as well.
     :raises InputError: if it is not.
     """
@@ -130,7 +127,6 @@ def open_topics(namespace: str, humans: Sequence[str], avs: Sequence[str]) -> li
     """
     Return those of a run's own topics that this process takes from every program all the same.
 
-    :param namespace: of the run's nodes.
     :param humans: ids of the humans' vehicles in the present game.
     :param avs: ids of its AVs.
     :return: their names; none where this process has no profile of a run.

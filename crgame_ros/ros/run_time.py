@@ -64,7 +64,6 @@ class GameAwaited:
     """
     A warning, given once, that messages of a run arrive whose game is unknown.
 
-    :param node: that waits.
     :param what: what the node cannot do without the game.
     """
 
@@ -78,7 +77,6 @@ class GameAwaited:
         """
         Update the state, and warn if the game is missing for too long.
 
-        :param known: whether the game is known.
         :param heard: whether a message of a run has come.
         """
         if known:

@@ -23,7 +23,6 @@ class ScenarioSet:
 
     :param loaded: the scenario; the same object as before while its text is the same.
     :param objects: all objects that can appear; the driven vehicles are those of the game.
-    :param game: the resolved game.
     :param texts: the documents as they came: xml, objects, game.
     """
 
@@ -86,11 +85,7 @@ class DocumentCollector:
 
 
 class ScenarioDocuments:
-    """
-    The three documents, read without an executor.
-
-    :param endpoints: of the node that reads them.
-    """
+    """The three documents, read without an executor."""
 
     def __init__(self, endpoints: Endpoints) -> None:
         self._slots = {kind: endpoints.polled(f'/scenario/{kind}') for kind in KINDS}

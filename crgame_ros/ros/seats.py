@@ -45,10 +45,8 @@ class Seat:
     """
     One vehicle's seat: the latest command of its source, and its age on the steady clock.
 
-    :param vehicle_id: of the seat.
     :param driver: the driver by the game: a driver source or the AV's planner.
     :param home: source name of the game's driver.
-    :param commands: subscription to the commands.
     :param clock_offset_ns: simulation time of step 0; older commands belong to a previous run [ns]
     :param recording: drives cycle by cycle while no other driver has the seat.
     """
@@ -194,11 +192,7 @@ class Seat:
 
 
 class SeatSpells:
-    """
-    The periods of a run with one driver per seat, in the order in which they began.
-
-    :param epoch: of the run.
-    """
+    """The periods of a run with one driver per seat, in the order in which they began."""
 
     def __init__(self, epoch: int) -> None:
         self._epoch = epoch
@@ -240,11 +234,8 @@ class Seats:
     """
     The seats of a run, humans first, in the order of `Setup.vehicles`.
 
-    :param endpoints: of sim_node.
-    :param setup: the run.
     :param clock_offset_ns: simulation time of step 0 [ns]
     :param sources: ordered sources by seat; kept across resets.
-    :param recorded: recorded inputs that drive seats; None for none.
     :param tenants: occupants by seat; kept across resets.
     """
 

@@ -16,7 +16,6 @@ class TrustedCode:
 
     It declares the parameter `roster`.
 
-    :param node: the node that loads code.
     :param named: the names in the node's own parameters.
     """
 

@@ -63,7 +63,6 @@ class WorldFollower:
     """
     A run's documents, and the states of its vehicles and `/traffic/objects`, in order, no gap.
 
-    :param endpoints: of the node.
     :param states: topic of the vehicles, at every step or at scenario time steps alone.
     :param begin: called where a run begins, or begins again, as in a recording that is played
         again, before the first of its steps is returned.
@@ -197,11 +196,7 @@ def _stamp_ns(message: JointTrajectory) -> int:
 
 
 class ObserverNode(Node, ABC, Generic[Observer]):
-    """
-    A node that passes each published state to an observer, a new one for each run.
-
-    :param name: of the node.
-    """
+    """A node that passes each published state to an observer, a new one for each run."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)

@@ -64,7 +64,6 @@ class Crossing:
     only in front of a vehicle that would hit it. In front of standing bodies it always stops, and
     waits until they are gone.
 
-    :param path: path of the pedestrian.
     :param walker: radius, speed, acceleration, accepted gap and kept distance.
     """
 
@@ -198,8 +197,6 @@ class ParticleMotion(Integrated):
     It walks along the straight lines between its way-points, slower at corners, which it rounds
     at about 0.1 m, and comes to rest at its goal. A reactive one stops for vehicles and in front
     of standing bodies (`Crossing`).
-
-    :param spec: specification of the object.
     """
 
     def __init__(self, spec: ObjectSpec) -> None:

@@ -163,7 +163,6 @@ class BicycleMotion(Integrated):
     there. A reactive object follows a leader on its path by the IDM. It ignores others to the
     side, and crossing ones before they are in the way.
 
-    :param spec: specification of the object.
     :param path: path of the rear axle.
     :param start: arc length of the centre at the beginning [m]
     :param wanted: (n,) wanted speed at each arc length of the path [m/s]
@@ -269,7 +268,6 @@ class ScriptedObjects:
     All objects react to the world of step k, then all move to k + 1. Therefore their order does
     not matter, and the same inputs give the same bits.
 
-    :param specs: specifications of the objects.
     :param network: network of the lanelets that objects may follow; None if there is none.
     :param time_step_s: Delta t_c [s]
     :param k0: scenario time step at which the run starts.

@@ -100,7 +100,6 @@ class CycleTable:
     """
     Rows read from `/timing/cycle`.
 
-    :param columns: names of the columns.
     :param rows: (R, columns) one row per cycle; rows without numbers of timing are left out,
         because anyone can publish them.
     """
@@ -118,7 +117,6 @@ class CycleTable:
         Read one message.
 
         :param label: of the second dimension: the columns, separated by commas.
-        :param data: the flattened rows.
         :raises InputError: if required columns are missing, or rows are incomplete.
         """
         columns = label.split(',')

@@ -68,7 +68,6 @@ class PhaseUse(NamedTuple):
     """
     The measured times and faults of a thread in one phase.
 
-    :param phase: which.
     :param lasted_ns: wall time; of a wait, the time by which it exceeded its due end [ns]
     :param computed_ns: processor time [ns]
     :param waited_ns: ready, but without a processor; None where the kernel does not count it [ns]

@@ -46,11 +46,7 @@ class _Told(NamedTuple):
 
 
 class PageReport:
-    """
-    Reports of the sound and view of each seat's page: every second and at each change.
-
-    :param diagnostics: of the node.
-    """
+    """Reports of the sound and view of each seat's page: every second and at each change."""
 
     def __init__(self, diagnostics: Diagnostics) -> None:
         self._diagnostics = diagnostics
@@ -119,7 +115,6 @@ class LiveBackend:
     """
     The backend of the page of a live run.
 
-    :param node: owner of the endpoints.
     :param runs: folder of the session's files; None where none are kept.
     """
 

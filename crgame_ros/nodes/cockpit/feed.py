@@ -37,12 +37,7 @@ SCAN_DEPTH = 64
 
 
 class AvFeed:
-    """
-    The plans, requests and perception of AVs, passed on to the pages that show them.
-
-    :param endpoints: of the node.
-    :param hub: all pages.
-    """
+    """The plans, requests and perception of AVs, passed on to the pages that show them."""
 
     def __init__(self, endpoints: Endpoints, hub: Hub) -> None:
         self._endpoints = endpoints
@@ -179,8 +174,6 @@ class CockpitFeed:
     """
     The live run as the page shows it, read from the graph without an executor.
 
-    :param endpoints: of the node.
-    :param hub: all pages.
     :param runs: folder of the session's files; None where none are kept.
     """
 

@@ -23,12 +23,7 @@ LOOK_S = 0.005
 
 
 class CockpitOrders:
-    """
-    The page's orders to the graph, sent and awaited without blocking.
-
-    :param node: owner of the clients.
-    :param endpoints: of the node.
-    """
+    """The page's orders to the graph, sent and awaited without blocking."""
 
     def __init__(self, node: Node, endpoints: Endpoints) -> None:
         self._node = node

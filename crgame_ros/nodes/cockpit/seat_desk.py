@@ -35,14 +35,7 @@ TELL_PERIOD_S = 1.0
 
 
 class PeopleFeed:
-    """
-    The list of people at this cockpit and their delays, published once a second.
-
-    :param endpoints: of the node.
-    :param hub: all pages.
-    :param table: the holder of each seat.
-    :param status: lists the devices of this machine.
-    """
+    """The list of people at this cockpit and their delays, published once a second."""
 
     def __init__(self, endpoints: Endpoints, hub: Hub, table: SeatTable,
                  status: RunStatus) -> None:
@@ -103,15 +96,7 @@ WAITS = ('waiting', 'paused')
 
 
 class SeatDesk:
-    """
-    The desk that carries out the pages' orders about seats and publishes their inputs.
-
-    :param node: owner of the endpoints.
-    :param endpoints: of the node.
-    :param orders: to the simulation.
-    :param hub: all pages.
-    :param feed: the state of the run.
-    """
+    """The desk that carries out the pages' orders about seats and publishes their inputs."""
 
     def __init__(self, node: Node, endpoints: Endpoints, orders: CockpitOrders, hub: Hub,
                  feed: CockpitFeed) -> None:

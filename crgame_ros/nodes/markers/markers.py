@@ -47,8 +47,6 @@ class SceneMarkers:
     The markers of one set of documents.
 
     Driven vehicles stand where the game starts them until their first states come.
-
-    :param documents: of the run.
     """
 
     def __init__(self, documents: ScenarioSet) -> None:

@@ -51,11 +51,7 @@ class StepOrder:
 
 
 class SimControl:
-    """
-    The orders to the simulation, as flags that its loop reads between cycles.
-
-    :param node: owner of services and parameters.
-    """
+    """The orders to the simulation, as flags that its loop reads between cycles."""
 
     def __init__(self, node: Node) -> None:
         self._node = node

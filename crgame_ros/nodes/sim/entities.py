@@ -121,7 +121,6 @@ class Entities:
     """
     The entities of a run: driven vehicles, then other objects.
 
-    :param simulation: source of their states.
     :ivar descriptions: of everything that can appear.
     """
 

@@ -37,11 +37,8 @@ class SimInputs:
     """
     The polled subscriptions of sim_node for one game.
 
-    :param node: owner of the subscriptions.
-    :param setup: the run.
     :param clock_offset_ns: simulation time of step 0 [ns]
     :param seat_sources: the ordered source of each seat, by seat.
-    :param recorded: recorded inputs that drive seats; None for none.
     :param tenants: occupants by seat.
     """
 

@@ -51,7 +51,6 @@ class Pacer:
     The pacer of the loop: it waits for each cycle on the steady clock and serves orders meanwhile.
 
     :param serve: runs a waiting service.
-    :param controller: computes when cycles are due.
     :param dt_s: nominal step [s]
     :param longest: cycles after which orders are served even if no time is left for them.
     """
@@ -105,13 +104,8 @@ class LiveRun:
     """
     One simulation, paced against the steady clock.
 
-    :param node: the node that owns the endpoints.
-    :param executor: runs its services.
-    :param control: orders from outside.
-    :param setup: the run.
     :param epoch: counts resets.
     :param clock_offset_ns: simulation time of step 0 [ns]
-    :param recorded: recorded inputs that drive seats; None for none.
     """
 
     def __init__(self, node: Node, executor: SingleThreadedExecutor, control: SimControl,

@@ -86,12 +86,7 @@ class VehicleOutputs:
 
 
 class SimOutputs:
-    """
-    The publishers of sim_node for one game.
-
-    :param node: owner of the publishers.
-    :param setup: the run.
-    """
+    """The publishers of sim_node for one game."""
 
     def __init__(self, node: Node, setup: Setup) -> None:
         self._node = node

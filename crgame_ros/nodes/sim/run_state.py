@@ -35,14 +35,7 @@ NEWCOMERS_NS = 3 * NS_PER_S
 
 
 class RunState:
-    """
-    The state of a run: waiting, running, paused or ended; on /sim/state and /diagnostics.
-
-    :param outputs: of the run.
-    :param simulation: the source of the world shown.
-    :param diagnostics: carry the state.
-    :param control: holds the real-time factor and the awaited seats.
-    """
+    """The state of a run: waiting, running, paused or ended; on /sim/state and /diagnostics."""
 
     def __init__(self, outputs: SimOutputs, simulation: Simulation, diagnostics: LiveDiagnostics,
                  control: SimControl) -> None:

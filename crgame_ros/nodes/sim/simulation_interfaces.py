@@ -62,7 +62,6 @@ class SimulationInterfaces:
     The callbacks of the standard's services and of its action.
 
     :param node: whose parameters name the world.
-    :param control: what the orders are passed to.
     :ivar callbacks: by the services' names in the contract.
     :ivar actions: kept here, since rclpy does not.
     """

@@ -37,13 +37,10 @@ class StartGate:
     not know the publisher yet, for up to a second. Answers prove that both do. The recorder itself
     reports which companions it has heard.
 
-    :param outputs: of the run.
-    :param inputs: of the run.
     :param simulation: at step 0.
     :param result: its first result.
     :param companions: nodes that must be connected, as `SimOutputs.missing` takes them.
     :param take_plan: passes an AV its new plan; returns whether it was accepted.
-    :param say: logs a line.
     :param traffic_answers: returns whether the agents of the next tick have come; None without
         any.
     :param heard: the topics that the recorder has received; None without a recorder to wait for.
@@ -168,7 +165,6 @@ class ReadyGate:
     all must have their hands on the controls, and a countdown follows. A driver that lets go
     during the countdown stops it. A game without such drivers does not wait here.
 
-    :param seats: of the run.
     :param control: orders from outside; gets the awaited seats and the countdown.
     """
 
