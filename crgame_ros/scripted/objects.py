@@ -273,6 +273,7 @@ class ScriptedObjects:
     :param k0: scenario time step at which the run starts.
     :param where: file and key for messages.
     :ivar descriptions: one for each object, in order.
+    :ivar states: of the objects at the current time step `k`, in read-only arrays.
     :raises InputError: if an object's lanelet or path cannot be used.
     """
 
@@ -289,12 +290,7 @@ class ScriptedObjects:
         self._particles = np.array([spec.kind == 'particle' for spec in specs], dtype=bool)
         self._lengths = np.array([item.shape.length for item in self.descriptions])
         self._widths = np.array([item.shape.width for item in self.descriptions])
-        self._states = self._gathered()
-
-    @property
-    def states(self) -> ObjectStates:
-        """Return the objects' states at the current time step `k`; read-only."""
-        return self._states
+        self.states = self._gathered()
 
     def advance(self, k: int, others_poses: FloatArray, others_velocities: FloatArray,
                 lengths: FloatArray, widths: FloatArray) -> None:
@@ -313,8 +309,8 @@ class ScriptedObjects:
         time_s = (k - self._k0) * self._time_step_s
         if self._reactive:
             everything = ObjectSurroundings(
-                np.concatenate((others_poses, self._states.poses)),
-                np.concatenate((others_velocities, self._states.velocities)),
+                np.concatenate((others_poses, self.states.poses)),
+                np.concatenate((others_velocities, self.states.velocities)),
                 np.concatenate((lengths, self._lengths)), np.concatenate((widths, self._widths)))
             present: NDArray[np.bool_] = np.isfinite(everything.poses[:, 0])
             for index in self._reactive:
@@ -328,7 +324,7 @@ class ScriptedObjects:
         for motion in self._motions:
             motion.move(time_s, self._time_step_s)
         self.k = k + 1
-        self._states = self._gathered()
+        self.states = self._gathered()
 
     def _gathered(self) -> ObjectStates:
         both = np.array([motion.state() for motion in self._motions]).reshape(-1, 2, 3)

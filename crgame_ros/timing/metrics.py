@@ -155,6 +155,7 @@ class TimingMetrics:
     with the run, leaves pauses out and is scaled by the real-time factor.
 
     :param dt_s: nominal step, which is also the budget of a cycle [s].
+    :ivar cycles: number of cycles so far.
     :raises InputError: if `dt_s` is no positive number.
     """
 
@@ -163,7 +164,7 @@ class TimingMetrics:
             raise InputError(f'the step {dt_s} is no positive number', 'timing metrics',
                              'give the simulation step in seconds')
         self.dt_s = dt_s
-        self._cycles = 0
+        self.cycles = 0
         self._timeouts = 0
         self._resets = 0
         self._first = (0.0, 0.0)
@@ -177,11 +178,6 @@ class TimingMetrics:
         self._late = 0
         self._step_errors = LogHistogram()
         self._busy = LogHistogram()
-
-    @property
-    def cycles(self) -> int:
-        """Return the number of cycles so far."""
-        return self._cycles
 
     def add_rows(self, rows: NDArray[np.float64]) -> None:
         """
@@ -200,7 +196,7 @@ class TimingMetrics:
             raise InputError('a time is no finite number', 'timing cycle', 'drop the row')
         ideal, actual, busy, dropped = rows.T
         scheduled = ideal - dropped
-        if self._cycles:
+        if self.cycles:
             before = np.array(self._last)[:, np.newaxis]
         else:
             self._first = (float(scheduled[0]), float(actual[0]))
@@ -208,7 +204,7 @@ class TimingMetrics:
             self._late = int(self._worst_lag > self.dt_s)
             before = np.empty((3, 0))
         self._add_steps(np.hstack((before, np.stack((scheduled, actual, dropped)))))
-        self._cycles += len(rows)
+        self.cycles += len(rows)
         self._timeouts += int(np.count_nonzero(busy > self.dt_s))
         self._max_error = max(self._max_error, float(np.abs(actual - scheduled).max()))
         self._busy.add_all(busy)
@@ -243,10 +239,10 @@ class TimingMetrics:
 
         :raises CrgameError: while there are fewer than two cycles, so no step to measure.
         """
-        steps = self._cycles - 1
+        steps = self.cycles - 1
         duration = self._last[1] - self._first[1]
         if steps < 1 or duration <= 0.0:
-            raise CrgameError(f'timing metrics: {self._cycles} cycles over {duration} s are too '
+            raise CrgameError(f'timing metrics: {self.cycles} cycles over {duration} s are too '
                               'few to measure; let the run take two steps or more')
         scheduled = self._last[0] - self._first[0]
         final_error = abs(self._last[1] - self._last[0])
@@ -255,12 +251,12 @@ class TimingMetrics:
             final_error_ms=1e3 * final_error,
             mean_step_error_ms=1e3 * self._step_error_sum / steps,
             max_cumulative_error_ms=1e3 * self._max_error,
-            timeout_ratio=self._timeouts / self._cycles,
+            timeout_ratio=self._timeouts / self.cycles,
             real_time_ratio=RealTimeRatio(efficiency, self._ratio_sum / self._ratio_count,
                                           self._ratio_min),
             time_efficiency=efficiency,
             precision_ratio=final_error / duration,
-            cycles=self._cycles,
+            cycles=self.cycles,
             duration_s=duration,
             rate_hz=steps / duration,
             resets=self._resets,

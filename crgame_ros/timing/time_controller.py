@@ -51,12 +51,13 @@ class TimeController:
 
     :param spec: thresholds and switches of the mechanisms.
     :param dt_s: nominal step Delta t [s]
+    :ivar real_time_factor: simulated seconds per wall second.
     """
 
     def __init__(self, spec: 'TimingSpec', dt_s: float) -> None:
         self._spec = spec
         self._dt_s = dt_s
-        self._factor = 1.0
+        self.real_time_factor = 1.0
         self._anchor_ns = 0.0
         self._start_ns = 0
         self._error_s = 0.0
@@ -64,11 +65,6 @@ class TimeController:
         self.n = 0
         self.resets = 0
         self.dropped_s = 0.0
-
-    @property
-    def real_time_factor(self) -> float:
-        """Return the simulated seconds per wall second."""
-        return self._factor
 
     def start(self, now_ns: int) -> None:
         """Start the schedule: t0 is now, and step 0 has begun."""
@@ -88,14 +84,14 @@ class TimeController:
                 raise InputError(
                     f'is {real_time_factor}', 'real_time_factor',
                     f'give {MIN_REAL_TIME_FACTOR} to {MAX_REAL_TIME_FACTOR}')
-            self._factor = real_time_factor
+            self.real_time_factor = real_time_factor
         elapsed_s = self.n * self._dt_s + self._error_s
-        self._anchor_ns = now_ns - elapsed_s / self._factor / NS
+        self._anchor_ns = now_ns - elapsed_s / self.real_time_factor / NS
         self._start_ns = now_ns
 
     def deadline_ns(self) -> int:
         """Return the wall time at which the next cycle is due (CRG 11) [ns]."""
-        step_ns = self._dt_s / self._factor / NS
+        step_ns = self._dt_s / self.real_time_factor / NS
         if not self._spec.pacing:
             # The naive loop waits for the length of a step and ignores the schedule.
             return int(self._start_ns + step_ns)
@@ -109,10 +105,10 @@ class TimeController:
             carried over like the clipped time, until intervals are measured again.
         """
         self.n += 1
-        measured_s = (now_ns - self._start_ns) * NS * self._factor
+        measured_s = (now_ns - self._start_ns) * NS * self.real_time_factor
         self._start_ns = now_ns
         ideal_s = self.n * self._dt_s
-        self._error_s = (now_ns - self._anchor_ns) * NS * self._factor - ideal_s
+        self._error_s = (now_ns - self._anchor_ns) * NS * self.real_time_factor - ideal_s
         moved_s = self._reset_if_due()
         effective_s = self._effective(measured_s - moved_s, interval_s)
         return Cycle(self.n, ideal_s + self.dropped_s, ideal_s + self.dropped_s + self._error_s,
@@ -126,7 +122,7 @@ class TimeController:
                 and self.n > spec.warm_up_steps):
             return 0.0
         dropped = self._error_s
-        self._anchor_ns += dropped / self._factor / NS
+        self._anchor_ns += dropped / self.real_time_factor / NS
         self.dropped_s += dropped
         self.resets += 1
         self._error_s = 0.0
