@@ -28,12 +28,30 @@ class Qos:
 
 
 @dataclass(frozen=True)
-class Topic:
+class Row:
     """
     One row of the contract.
 
-    :param name: with a placeholder <hv>, <av> or <v> for a vehicle's id.
+    :param name: with a placeholder <hv>, <av> or <v> for a vehicle's id, if each of them has one.
     :param type_name: package/msg/Type.
+    :param optional: whether it is left out where its type's package is not installed.
+    """
+
+    name: str
+    type_name: str
+    optional: bool
+
+    @property
+    def available(self) -> bool:
+        """Return whether it is available; only an optional one may not be."""
+        return not self.optional or find_spec(self.type_name.partition('/')[0]) is not None
+
+
+@dataclass(frozen=True)
+class Topic(Row):
+    """
+    A topic.
+
     :param producers: nodes that publish it; `external` stands for others.
     :param consumers: nodes that subscribe to it; `external` stands for others.
     :param record: whether the recorder records it.
@@ -42,11 +60,8 @@ class Topic:
     :param max_bytes: of a serialised message; longer ones are refused.
     :param points: fewest and most points of a trajectory.
     :param finite: whether all positions and velocities of a trajectory are finite.
-    :param optional: whether it is left out where its type's package is not installed.
     """
 
-    name: str
-    type_name: str
     qos: Qos
     producers: tuple[str, ...]
     consumers: tuple[str, ...]
@@ -56,12 +71,6 @@ class Topic:
     max_bytes: int
     points: tuple[int, int]
     finite: bool
-    optional: bool
-
-    @property
-    def available(self) -> bool:
-        """Return whether the topic is available; only an optional one may not be."""
-        return not self.optional or _is_installed(self.type_name)
 
     @property
     def is_own(self) -> bool:
@@ -88,23 +97,10 @@ class Topic:
 
 
 @dataclass(frozen=True)
-class Service:
-    """
-    One service or action of the contract, offered by sim_node.
+class Service(Row):
+    """A service or action, offered by sim_node."""
 
-    :param name: with a placeholder <av> for an AV's id, if each AV has one.
-    :param optional: whether it is left out where its type's package is not installed.
-    """
-
-    name: str
-    type_name: str
     what: str
-    optional: bool
-
-    @property
-    def available(self) -> bool:
-        """Return whether it is available; only an optional one may not be."""
-        return not self.optional or _is_installed(self.type_name)
 
     def names(self, avs: Sequence[str]) -> tuple[str, ...]:
         """Return the service's names in a run with these AVs."""
@@ -121,10 +117,6 @@ class Contract:
     services: Mapping[str, Service]
     actions: Mapping[str, Service]
     parameters: Mapping[str, Mapping[str, Mapping[str, str]]]
-
-    def topic(self, name: str) -> Topic:
-        """Return a topic by its name in the contract."""
-        return self.topics[name]
 
 
 @functools.cache
@@ -147,15 +139,11 @@ def load_contract(path: Path | None = None) -> Contract:
             topics[name] = _topic(name, row, profiles, content['max_bytes'])
         for section, found in (('services', services), ('actions', actions)):
             for name, row in content[section].items():
-                found[name] = Service(name, row['type'], row['what'],
-                                      bool(row.get('optional', False)))
+                found[name] = Service(name, row['type'], bool(row.get('optional', False)),
+                                      row['what'])
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f'{error} is missing or wrong', f'{path}: {name}') from error
     return Contract(topics, services, actions, content['parameters'])
-
-
-def _is_installed(type_name: str) -> bool:
-    return find_spec(type_name.partition('/')[0]) is not None
 
 
 def _topic(name: str, row: Mapping[str, Any], profiles: Mapping[str, Qos],
@@ -163,7 +151,7 @@ def _topic(name: str, row: Mapping[str, Any], profiles: Mapping[str, Qos],
     qos = profiles[row['qos']] if isinstance(row['qos'], str) else Qos(**row['qos'])
     producer = row['producer']
     producers = (producer,) if isinstance(producer, str) else tuple(producer)
-    return Topic(name, row['type'], qos, producers, tuple(row['consumers']), row['record'],
-                 str(row['rate_hz']), row['fields'], int(row.get('max_bytes', max_bytes)),
-                 tuple(row.get('points', (1, 1))), bool(row.get('finite', False)),
-                 bool(row.get('optional', False)))
+    return Topic(name, row['type'], bool(row.get('optional', False)), qos, producers,
+                 tuple(row['consumers']), row['record'], str(row['rate_hz']), row['fields'],
+                 int(row.get('max_bytes', max_bytes)), tuple(row.get('points', (1, 1))),
+                 bool(row.get('finite', False)))

@@ -171,7 +171,7 @@ class Endpoints:
 
     def publisher(self, name: str, vehicle_id: str = '') -> Publisher:
         """Create a publisher."""
-        topic = self._contract.topic(name)
+        topic = self._contract.topics[name]
         return self._node.create_publisher(
             message_type(topic.type_name), relative(topic.name_for(vehicle_id)),
             qos_profile(topic.qos))
@@ -179,7 +179,7 @@ class Endpoints:
     def subscription(self, name: str, callback: Callable[[object], None],
                      vehicle_id: str = '') -> Subscription:
         """Create a subscription whose callback an executor runs."""
-        topic = self._contract.topic(name)
+        topic = self._contract.topics[name]
         intake = MessageValidator(topic, topic.name_for(vehicle_id))
 
         def read(data: bytes) -> None:
@@ -206,7 +206,7 @@ class Endpoints:
             it.
         :param sent: tell whose message it is.
         """
-        topic = self._contract.topic(name)
+        topic = self._contract.topics[name]
         profile = qos_profile(topic.qos)
         if depth is not None:
             profile.depth = depth

@@ -123,7 +123,7 @@ def test_qos_is_what_rclpy_gets(topic: Topic) -> None:
 def test_slots_are_one_deep_and_documents_latched() -> None:
     """CRG algorithm 2 exchanges single slots; a late subscriber still gets the documents."""
     for name in ('/<av>/plan_request', '/<av>/plan', '/<v>/driver_command'):
-        assert CONTRACT.topic(name).qos.depth == 1
+        assert CONTRACT.topics[name].qos.depth == 1
     happenings = ('/trigger', '/seats/order', '/tasks/log', '/tasks/report',
                   '/instruments/texts', '/views/pictures')
     for topic in TOPICS:
@@ -139,7 +139,7 @@ def test_what_is_recorded_goes_to_the_recorder() -> None:
 
 def test_simulation_time_has_one_publisher() -> None:
     """Only `sim_node` owns the clock."""
-    assert CONTRACT.topic('/clock').producers == ('sim_node',)
+    assert CONTRACT.topics['/clock'].producers == ('sim_node',)
 
 
 def test_placeholders_stand_for_the_vehicles_of_a_kind() -> None:
@@ -153,8 +153,8 @@ def test_placeholders_stand_for_the_vehicles_of_a_kind() -> None:
     everything = [name for group in names.values() for name in group]
     assert len(set(everything)) == len(everything)
     assert not any('<' in name for name in everything)
-    assert CONTRACT.topic('/<v>/odom').name_for('av7') == '/av7/odom'
-    assert CONTRACT.topic('/clock').name_for('av7') == '/clock'
+    assert CONTRACT.topics['/<v>/odom'].name_for('av7') == '/av7/odom'
+    assert CONTRACT.topics['/clock'].name_for('av7') == '/clock'
 
 
 def test_services_and_parameters_name_what_exists() -> None:

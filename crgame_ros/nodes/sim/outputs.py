@@ -266,7 +266,7 @@ class SimOutputs:
 
         :param companions: names of nodes, `planner_node_av0`, or of their executables.
         """
-        contract = load_contract()
+        topics = load_contract().topics
         found: set[str] = set()
         for name, publishers in {
                 '/clock': {'': self._clock}, '/vehicles/state': {'': self._state},
@@ -275,7 +275,7 @@ class SimOutputs:
                 '/<av>/plan_request': self._requests_as('/<av>/plan_request'),
                 '/<av>/true_request': self._requests_as('/<av>/true_request'),
                 }.items():
-            consumers = contract.topic(name).consumers
+            consumers = topics[name].consumers
             for vehicle_id, publisher in publishers.items():
                 expected = {item for item in companions if _consumes(item, consumers, vehicle_id)}
                 found |= expected - self._connected(publisher, expected)
