@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 import ctypes
 from functools import cache
 import time
-from typing import Any, Generic, NamedTuple, TYPE_CHECKING, TypeVar
+from typing import Any, Generic, TYPE_CHECKING, TypeVar
 from weakref import WeakKeyDictionary
 
 from crgame_ros.errors import InputError
@@ -117,11 +117,11 @@ class PolledSubscription(Generic[T]):
 
     def _take(self) -> tuple[bytes, int, int] | None:
         if self._sent:
-            message = _take_sent(self.subscription)
-            if message is None:
+            sent = _take_sent(self.subscription)
+            if sent is None:
                 return None
-            self.publisher = message.publisher
-            return message[:3]
+            data, published_ns, received_ns, self.publisher = sent
+            return data, published_ns, received_ns
         handle = self.subscription.handle
         with handle:
             taken = handle.take_message(self.subscription.msg_type, True)
@@ -324,25 +324,12 @@ class _Info(ctypes.Structure):
                 ('publisher', _Gid), ('from_intra_process', ctypes.c_bool)]
 
 
-class SentMessage(NamedTuple):
-    """
-    A serialised message.
-
-    :param published_ns: time of publication [ns since 1970]
-    :param received_ns: time of reception [ns since 1970]
-    :param publisher: its id, the `endpoint_gid` of rclpy's information on a topic.
-    """
-
-    data: bytes
-    published_ns: int
-    received_ns: int
-    publisher: bytes
-
-
-def _take_sent(subscription: Subscription) -> SentMessage | None:
+def _take_sent(subscription: Subscription) -> tuple[bytes, int, int, bytes] | None:
     """
     Remove and return the oldest message of a subscription, None if there is none.
 
+    :return: the serialised message, the times of its publication and reception [ns since 1970],
+        and the id of its publisher, which is the `endpoint_gid` of rclpy's information on a topic
     :raises RuntimeError: if the middleware fails.
     """
     rcl, message = _rcl()
@@ -355,8 +342,8 @@ def _take_sent(subscription: Subscription) -> SentMessage | None:
         return None
     if code != _OK:
         raise RuntimeError(f'{subscription.topic_name}: cannot be read (rcl: {code})')
-    return SentMessage(ctypes.string_at(message.buffer, message.length), info.source_ns,
-                       info.received_ns, bytes(info.publisher.data))
+    return (ctypes.string_at(message.buffer, message.length), info.source_ns, info.received_ns,
+            bytes(info.publisher.data))
 
 
 @cache
