@@ -4,6 +4,7 @@
 
 import asyncio
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -90,10 +91,7 @@ class CockpitNode(Node):
             await runner.cleanup()
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(CockpitNode, args)
-
+main = partial(run_node, CockpitNode)
 
 if __name__ == '__main__':
     main()

@@ -3,6 +3,7 @@
 """criticality_node: the time, distance and braking left to every driven vehicle."""
 
 from array import array
+from functools import partial
 import time
 
 from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES, TickMeasures
@@ -99,10 +100,7 @@ class CriticalityNode(ObserverNode[Criticality]):
             '; '.join(critical) or 'not critical', told, stamp_ns)
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(CriticalityNode, args)
-
+main = partial(run_node, CriticalityNode)
 
 if __name__ == '__main__':
     main()

@@ -3,6 +3,7 @@
 """drivability_node: collision and road compliance of every driven vehicle (CRG III-D)."""
 
 from collections.abc import Sequence
+from functools import partial
 import time
 
 from crgame_ros.drivability.monitor import (
@@ -58,10 +59,7 @@ class DrivabilityNode(ObserverNode[DrivabilityMonitor]):
                 drivability_status(verdict, self._spec), stamp_ns))
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(DrivabilityNode, args)
-
+main = partial(run_node, DrivabilityNode)
 
 if __name__ == '__main__':
     main()

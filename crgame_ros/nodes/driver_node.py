@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """driver_node: one human's input, normalised and filtered in simulation time (CRG III-C1)."""
 
+from functools import partial
 import select
 import threading
 import time
@@ -229,10 +230,7 @@ class DriverNode(PromptNode):
             DiagnosticStatus.ERROR if text else DiagnosticStatus.OK, text or 'device found', {})
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(DriverNode, args)
-
+main = partial(run_node, DriverNode)
 
 if __name__ == '__main__':
     main()

@@ -4,6 +4,7 @@
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 import math
 import os
 import time
@@ -371,10 +372,7 @@ class InstrumentsNode(Node):
                 {'sent': self._triggers.count, 'lost': self._triggers.lost})
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(InstrumentsNode, args)
-
+main = partial(run_node, InstrumentsNode)
 
 if __name__ == '__main__':
     main()

@@ -3,6 +3,7 @@
 """map_node: the permanent obstacles near the driven vehicles (FS II-A2)."""
 
 from array import array
+from functools import partial
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.documents import GAME
@@ -104,10 +105,7 @@ class MapNode(Node):
         self._publisher.publish(message)
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(MapNode, args)
-
+main = partial(run_node, MapNode)
 
 if __name__ == '__main__':
     main()

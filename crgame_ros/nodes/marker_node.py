@@ -4,6 +4,7 @@
 
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from functools import partial
 import math
 import time
 
@@ -257,10 +258,7 @@ class Transforms:
                 transforms=vehicle_transforms(vehicle_ids, poses, stamp_ns)))
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(MarkerNode, args)
-
+main = partial(run_node, MarkerNode)
 
 if __name__ == '__main__':
     main()

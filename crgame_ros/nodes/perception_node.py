@@ -3,6 +3,7 @@
 """perception_node: one AV's perception of the true world (FS II-B)."""
 
 from array import array
+from functools import partial
 import gc
 import math
 import time
@@ -212,10 +213,7 @@ class ScanMessages:
             self._publisher.publish(message)
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(PerceptionNode, args)
-
+main = partial(run_node, PerceptionNode)
 
 if __name__ == '__main__':
     main()

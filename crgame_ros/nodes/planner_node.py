@@ -191,10 +191,7 @@ def _path(plan: Plan, transform: RigidTransform) -> Path:
     return message
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(PlannerNode, args)
-
+main = partial(run_node, PlannerNode)
 
 if __name__ == '__main__':
     main()

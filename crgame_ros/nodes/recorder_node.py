@@ -4,6 +4,7 @@
 
 from collections import deque
 from dataclasses import dataclass
+from functools import partial
 import math
 from pathlib import Path
 import time
@@ -376,10 +377,7 @@ def _simulation_in(bag: Path) -> str | None:
     return None
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(RecorderNode, args)
-
+main = partial(run_node, RecorderNode)
 
 if __name__ == '__main__':
     main()

@@ -4,6 +4,7 @@
 
 from contextlib import nullcontext
 from dataclasses import asdict
+from functools import partial
 import json
 import os
 import time
@@ -208,10 +209,7 @@ def refuse_another(node: Node, until_s: float) -> None:
     endpoints.release(heard)
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(SimNode, args)
-
+main = partial(run_node, SimNode)
 
 if __name__ == '__main__':
     main()

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """timesync_node: the time-sync supervisor; computes CRG table I live and orders frame skipping."""
 
+from functools import partial
 import time
 
 from crgame_ros.errors import CrgameError, InputError
@@ -124,10 +125,7 @@ class TimesyncNode(Node):
              for key, value in values.items()})
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(TimesyncNode, args)
-
+main = partial(run_node, TimesyncNode)
 
 if __name__ == '__main__':
     main()

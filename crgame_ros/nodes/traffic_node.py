@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """traffic_node: reactive traffic in its own process (FS III)."""
 
+from functools import partial
 import gc
 import time
 
@@ -185,10 +186,7 @@ class TrafficNode(Node):
         return traffic
 
 
-def main(args: list[str] | None = None) -> None:
-    """Run the node."""
-    run_node(TrafficNode, args)
-
+main = partial(run_node, TrafficNode)
 
 if __name__ == '__main__':
     main()

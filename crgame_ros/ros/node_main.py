@@ -85,7 +85,7 @@ def _check_parameters(node: RunnableNode) -> None:
                              'there are ' + ', '.join(has))
 
 
-def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) -> None:
+def run_node(create: Callable[[], RunnableNode]) -> None:
     """
     Run a node until it is done, interrupted or shut down.
 
@@ -94,7 +94,6 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
     signal, 2 on bad input and 1 on any other known error, always with a one-line reason.
 
     :param create: builds the node, once rclpy is initialised.
-    :param args: command line; that of the process where None.
     """
     faulthandler.register(TELL_WHERE)
     name_process(Path(sys.argv[0]).stem)
@@ -115,7 +114,7 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
     node = None
     try:
         try:
-            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+            rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         except RuntimeError as error:
             raise InputError(f'ROS refuses it: {one_line(str(error))}', 'command line') from error
         node = create()
