@@ -249,16 +249,15 @@ class Seats:
         self._orders = endpoints.polled('/seats/order')
         self._sources = sources
         self._tenants = {} if tenants is None else tenants
-        self.humans = [
-            Seat(human.id, human.driver, home_of(human.driver),
-                 endpoints.polled('/<v>/driver_command', human.id, depth=SHARED_DEPTH,
-                                  strict=True),
-                 clock_offset_ns, drivers.get(human.id)) for human in setup.humans]
-        self.avs = [
-            Seat(av.id, av.spec.planner, PLANNER,
-                 endpoints.polled('/<v>/driver_command', av.id, depth=SHARED_DEPTH,
-                                  strict=True),
-                 clock_offset_ns, drivers.get(av.id)) for av in setup.avs]
+
+        def seat_of(vehicle: str, driver: str, home: str) -> Seat:
+            commands = endpoints.polled('/<v>/driver_command', vehicle, depth=SHARED_DEPTH,
+                                        strict=True)
+            return Seat(vehicle, driver, home, commands, clock_offset_ns, drivers.get(vehicle))
+
+        self.humans = [seat_of(human.id, human.driver, home_of(human.driver))
+                       for human in setup.humans]
+        self.avs = [seat_of(av.id, av.spec.planner, PLANNER) for av in setup.avs]
         self.all = [*self.humans, *self.avs]
         self._taken_over_again: list[bool] = []
         for seat in self.all:
@@ -286,12 +285,8 @@ class Seats:
     def commands(self, now_ns: int, dt_s: float,
                  simulation: 'Simulation') -> list[DriverCommand | None]:
         """Return the command of every seat for this cycle; None for AVs that follow their plan."""
-        n = simulation.n
-        return [
-            *(seat.command(now_ns, dt_s, human.state.speed, n)
-              for seat, human in zip(self.humans, simulation.humans, strict=True)),
-            *(seat.command(now_ns, dt_s, av.state.speed, n)
-              for seat, av in zip(self.avs, simulation.avs, strict=True))]
+        return [seat.command(now_ns, dt_s, state.speed, simulation.n)
+                for seat, state in zip(self.all, simulation.states, strict=True)]
 
     def awaited(self, now_ns: int) -> tuple[str, ...]:
         """Return the ids of the seats whose driver must come before the run can begin."""
