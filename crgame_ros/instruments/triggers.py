@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Triggers to an amplifier: single bytes over a serial port or a network line."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 import queue
 import socket
@@ -36,20 +35,7 @@ class SentTrigger(NamedTuple):
     at_s: float
 
 
-class _Line(ABC):
-    """An open line; its methods raise OSError."""
-
-    @abstractmethod
-    def write(self, code: int) -> None:
-        """Write a byte."""
-
-    @abstractmethod
-    def close(self) -> None:
-        """Close it."""
-
-
-class _SerialLine(_Line):
-    """A serial port."""
+class _SerialLine:
 
     def __init__(self, port: str, baud: int) -> None:
         import serial
@@ -63,7 +49,7 @@ class _SerialLine(_Line):
         self._port.close()
 
 
-class _NetworkLine(_Line):
+class _NetworkLine:
     """A connection of TCP, or datagrams."""
 
     def __init__(self, address: str, protocol: str) -> None:
@@ -99,6 +85,10 @@ class _NetworkLine(_Line):
 
     def close(self) -> None:
         self._socket.close()
+
+
+# An open line; its methods raise OSError.
+_Line = _SerialLine | _NetworkLine
 
 
 def _opened(spec: TriggerSpec) -> _Line:
