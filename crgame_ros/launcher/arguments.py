@@ -143,9 +143,9 @@ class _Parser(argparse.ArgumentParser):
         raise InputError(message, 'command line', 'see --help')
 
 
-def build_parser(program: str) -> argparse.ArgumentParser:
+def build_parser() -> argparse.ArgumentParser:
     """Build the parser and its help text."""
-    parser = _Parser(prog=program, description=DESCRIPTION, epilog=EPILOG,
+    parser = _Parser(prog='run.sh', description=DESCRIPTION, epilog=EPILOG,
                      formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parser.add_argument
     add('game', nargs='?', type=Path, metavar='GAME', help='game file (YAML), CommonRoad file '
@@ -210,13 +210,13 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     return parser
 
 
-def parse_arguments(arguments: Sequence[str], program: str = 'run.sh') -> RunRequest:
+def parse_arguments(arguments: Sequence[str]) -> RunRequest:
     """
     Read the command line.
 
     :raises InputError: naming the argument.
     """
-    values = vars(build_parser(program).parse_args(list(arguments)))
+    values = vars(build_parser().parse_args(list(arguments)))
     values['planners'] = tuple(values['planners'])
     values['options'] = read_options(values['options'])
     values['problems'] = tuple(values['problems'])

@@ -63,7 +63,7 @@ def _name(action: Action) -> str:
 
 
 LAUNCH_ARGUMENTS = {_name(action): _argument(action)
-                    for action in build_parser('run.sh')._actions if action.dest not in _LEFT_OUT}
+                    for action in build_parser()._actions if action.dest not in _LEFT_OUT}
 
 
 def launch_words(values: Mapping[str, str]) -> list[str]:

@@ -152,19 +152,19 @@ def lock_memory() -> bool:
 _CALLS = {'x86_64': 314, 'aarch64': 274}
 # struct sched_attr: size, policy, flags, nice, priority, runtime (the slice), deadline, period.
 _ATTRIBUTES = struct.Struct('=IIQiIQQQ')
+# The kernel's least.
 SHORTEST_NS = 100_000
 
 
-def shorten_time_slice(slice_ns: int = SHORTEST_NS) -> bool:
+def shorten_time_slice() -> bool:
     """
-    Request a time slice for this thread; its policy and niceness stay.
+    Request the shortest time slice for this thread; its policy and niceness stay.
 
-    :param slice_ns: at least 0.1 ms, the kernel's least [ns]
     :return: whether the kernel accepted the call.
     """
     number = _CALLS.get(platform.machine())
     if number is None or os.sched_getscheduler(0) != os.SCHED_OTHER:
         return False
     attributes = _ATTRIBUTES.pack(_ATTRIBUTES.size, os.SCHED_OTHER, 0,
-                                  os.getpriority(os.PRIO_PROCESS, 0), 0, slice_ns, 0, 0)
+                                  os.getpriority(os.PRIO_PROCESS, 0), 0, SHORTEST_NS, 0, 0)
     return bool(ctypes.CDLL(None).syscall(number, 0, ctypes.c_char_p(attributes), 0) == 0)

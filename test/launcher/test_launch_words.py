@@ -55,7 +55,7 @@ def test_every_argument_reaches_the_launcher(tmp_path: Path) -> None:
 
 def test_every_option_of_a_run_is_an_argument() -> None:
     """None is forgotten: `--help` lists what `--show-args` does, except for --replay."""
-    options = set(re.findall(r'--[a-z-]+', build_parser('run.sh').format_help().partition(
+    options = set(re.findall(r'--[a-z-]+', build_parser().format_help().partition(
         'examples:')[0])) - {'--help', '--replay'}
     assert {argument.option for argument in LAUNCH_ARGUMENTS.values()} - {''} == options
 
