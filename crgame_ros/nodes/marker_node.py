@@ -179,10 +179,11 @@ class MarkerNode(Node):
         for av_id, (plans, requests) in self._paths.items():
             try:
                 if (plan := plans.latest()) is not None:
-                    scene.set_plan(av_id, from_joint_trajectory(plan, f'/{av_id}/plan'))
+                    scene.paths[av_id].set_plan(
+                        from_joint_trajectory(plan, f'/{av_id}/plan'))
                 if (request := requests.latest()) is not None:
-                    scene.set_prediction(
-                        av_id, from_joint_trajectory(request, f'/{av_id}/plan_request'))
+                    scene.paths[av_id].set_prediction(
+                        from_joint_trajectory(request, f'/{av_id}/plan_request'))
             except InputError as error:
                 # The plan's AV refuses it and reports that; here the plan is just not drawn.
                 complain(self, av_id, str(error))

@@ -314,11 +314,11 @@ def test_plan_is_drawn_until_it_is_used_up(scene: SceneMarkers, setup: Setup) ->
     x = np.linspace(0.0, 30.0, 31)
     plan = _series(vehicle_joint_names('av0'),
                    np.stack((x, 0.1 * x, 0.0 * x, 0.0 * x), axis=1))
-    scene.set_plan('av0', plan)
+    scene.paths['av0'].set_plan(plan)
     line = _by_key(scene.message().markers)['plan', 0]
     assert line.type == Marker.LINE_STRIP
     assert np.allclose(_points(line), np.stack((x, 0.1 * x), axis=1), atol=1e-12)
-    scene.set_plan('av0', _series(vehicle_joint_names('av1'), np.zeros((31, 4))))
+    scene.paths['av0'].set_plan(_series(vehicle_joint_names('av1'), np.zeros((31, 4))))
     assert np.allclose(_points(line)[-1], (30.0, 3.0))
     states = np.array([vehicle.state for vehicle in setup.vehicles])
     for after_ns, action in ((30 * TICK_NS, Marker.ADD), (31 * TICK_NS, Marker.DELETE)):

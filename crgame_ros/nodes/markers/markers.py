@@ -47,6 +47,8 @@ class SceneMarkers:
     The markers of one set of documents.
 
     Driven vehicles stand where the game starts them until their first states come.
+
+    :ivar paths: plan and prediction of each AV, by its id.
     """
 
     def __init__(self, documents: ScenarioSet) -> None:
@@ -62,7 +64,7 @@ class SceneMarkers:
         outlines = {
             item.id: outline(item.shape, CIRCLE_CORNERS, False) + (item.rear_to_center, 0.0)
             for item in documents.objects}
-        self._paths = {av.id: AvPaths(
+        self.paths = {av.id: AvPaths(
             self._header, number, av.id, av.transform,
             outlines if av.perception is not None else {})
             for number, av in enumerate(game.avs)}
@@ -114,20 +116,12 @@ class SceneMarkers:
         self._recorded_brake[:] = [
             signals.objects.get(name, 0) & Light.BRAKE > 0 for name in self._object_ids]
 
-    def set_plan(self, av_id: str, series: JointSeries) -> None:
-        """Set an AV's plan."""
-        self._paths[av_id].set_plan(series)
-
-    def set_prediction(self, av_id: str, series: JointSeries) -> None:
-        """Set the prediction of the others from an AV's plan request."""
-        self._paths[av_id].set_prediction(series)
-
     def message(self) -> MarkerArray:
         """Return the markers that move or change, at the time of the vehicles' states."""
         set_time(self._header.stamp, self._stamp_ns)
         self._place_objects()
         items: list[Item] = [*self._lights.values(), *self._bodies]
-        for paths in self._paths.values():
+        for paths in self.paths.values():
             paths.expire(self._stamp_ns)
             items += (paths.plan, paths.prediction, paths.perceived)
         markers: list[Marker] = []
