@@ -3,7 +3,7 @@
 """The command line of `run.sh`."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -164,7 +164,8 @@ def build_parser() -> argparse.ArgumentParser:
         'and the program stays for the next one until Ctrl-C, unless it is headless)')
     add('--rate', type=_positive, metavar='R', dest='rate_hz',
         help="simulation rate in Hz (default: the game's, else 100)")
-    add('--real-time-factor', type=_factor, default=1.0, metavar='F',
+    add('--real-time-factor', type=_within(MIN_REAL_TIME_FACTOR, MAX_REAL_TIME_FACTOR),
+        default=1.0, metavar='F',
         help='simulated seconds per second, 0.1 to 10 (default: 1)')
     add('--headless', action='store_true', help='without the cockpit, the page in the browser')
     add('--port', type=_port, default=8080, metavar='P',
@@ -187,7 +188,7 @@ def build_parser() -> argparse.ArgumentParser:
     add('--replay', type=Path, metavar='BAG',
         help='show a recording in the page instead of running a game; goes with --port, --listen '
         'and --token')
-    add('--countdown', type=_countdown, default=3.0, metavar='S', dest='countdown_s',
+    add('--countdown', type=_within(0, 60), default=3.0, metavar='S', dest='countdown_s',
         help='seconds from when all drivers at pages are ready to the start (default: 3)')
     add('--start-paused', action='store_true',
         help='start every game paused, until it is started in the page or by /sim/start (default: '
@@ -307,19 +308,14 @@ def _port(text: str) -> int:
     return int(text)
 
 
-def _countdown(text: str) -> float:
-    value = _number(text)
-    if not 0.0 <= value <= 60.0:
-        raise argparse.ArgumentTypeError(f'{text} is not within 0 to 60')
-    return value
-
-
-def _factor(text: str) -> float:
-    value = _number(text)
-    if not MIN_REAL_TIME_FACTOR <= value <= MAX_REAL_TIME_FACTOR:
-        raise argparse.ArgumentTypeError(
-            f'{text} is not within {MIN_REAL_TIME_FACTOR} to {MAX_REAL_TIME_FACTOR}')
-    return value
+def _within(least: float, most: float) -> Callable[[str], float]:
+    """Return a reader of numbers within bounds."""
+    def read(text: str) -> float:
+        value = _number(text)
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f'{text} is not within {least} to {most}')
+        return value
+    return read
 
 
 def _number(text: str) -> float:
