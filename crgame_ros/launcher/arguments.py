@@ -49,37 +49,12 @@ module:Class, file.py:Class or policy:FILE.py:load."""
 @dataclass(frozen=True)
 class RunRequest:
     """
-    The user's request on the command line.
+    The user's request on the command line, whose help describes each option (`build_parser`).
 
-    :param game: game file, or name of one of the package's games; a CommonRoad file, or a
-        benchmark id, is moved to `scenario`.
-    :param scenario: CommonRoad file instead of the game's; given by an id, it is looked up.
-    :param driver: driver source of the first human.
-    :param planners: planners of the AVs in their order; a single one serves all.
+    :param game: a CommonRoad file, or a benchmark id, is moved to `scenario`.
+    :param driver: driver source of the first human; `drivers` has those of humans by their ids.
+    :param planners: of the AVs in their order; a single one serves all.
     :param options: of the planners of all AVs, by name; they go before those of the game.
-    :param problems: planning problems that become AVs, where the game names none. If empty, all of
-        them do; of several that start on one spot, only the first.
-    :param duration_s: simulated time [s]
-    :param rate_hz: simulation rate [Hz]
-    :param headless: without the cockpit.
-    :param port: of the cockpit's page; the next free one when it is taken.
-    :param listen: address on which the page is served beyond this machine, with a token.
-    :param token: ask for a token on this machine too.
-    :param open_cockpit: admit people only by links, each for one browser, over TLS.
-    :param certificate: PEM file for TLS, instead of a generated one.
-    :param key: of the certificate.
-    :param replay: recording to show in the page; nothing is simulated then.
-    :param realtime_priority: SCHED_FIFO for the simulation.
-    :param namespace: of all nodes, topics and services.
-    :param no_report: write no report (one HTML file) at the end of each run.
-    :param drivers: driver sources of humans by their ids.
-    :param countdown_s: time from the readiness of all drivers at pages to the start [s]
-    :param start_paused: whether every game waits for a start order.
-    :param framed_by: origins of the only pages that may embed the cockpit's page.
-    :param open_topics: whether messages of any program count on every topic, not on those alone
-        that the contract names as open.
-    :param own_orders: whether services answer the run's own nodes alone.
-    :param out: folder of the run, instead of runs/<time>_<scenario>.
     """
 
     game: Path | None = None
