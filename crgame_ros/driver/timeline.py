@@ -55,17 +55,7 @@ class KeyTimeline:
     """
     The keys that a scripted human holds.
 
-    Written by hand as intervals of simulation time [s] since the start of the run; they may
-    overlap, and a key is held from `from` until just before `to` while any interval holds it:
-
-        keys:
-          - {from: 0.0, to: 3.0, hold: [throttle]}
-          - {from: 2.0, to: 2.4, hold: [left]}
-          - {from: 6.0, to: 8.0, hold: [throttle, reverse]}
-
-    The keys are throttle, brake, left and right; reverse requests the gear while held;
-    left_indicator, right_indicator and horn are on while held; put_back asks to be put back on the
-    lane.
+    Intervals may overlap: a key is held while any of them holds it.
     """
 
     intervals: tuple[KeyInterval, ...]
@@ -104,20 +94,7 @@ class JoyTimeline:
     """
     The axes that a scripted human moves: a device whose raw axes are CRG 17's ratios.
 
-    Written by hand as points of simulation time [s] since the start of the run, followed by
-    the listed axes; linear between points, constant before the first and after the last. Axes that
-    are not listed rest. The reverse gear is requested in the intervals of reverse. The indicators
-    and the horn are on in theirs, and in those of put_back the vehicle is to be put back:
-
-        joy:
-          axes: [throttle, brake, steering]
-          points:
-            - [0.0, 0.4, 0.0, 0.0]
-            - [3.0, 0.4, 0.0, 0.2]
-          reverse:
-            - {from: 6.0, to: 8.0}
-          left_indicator:
-            - {from: 2.0, to: 4.0}
+    They are linear between points, constant before the first and after the last.
 
     :param times_s: (P) times of the points, rising [s].
     :param values: (P, 3) throttle, brake in [0, 1], steering in [-1, 1], positive to the left.
@@ -277,7 +254,7 @@ def parse_timeline(text: str, where: str) -> Timeline:
     """
     Read the text of a timeline (YAML, or JSON, which is YAML too).
 
-    :param text: in the format of `KeyTimeline` or `JoyTimeline`.
+    :param text: as `TimelineFile` declares it; docs/driving.md has examples.
     :param where: the file's name, for messages.
     :raises InputError: naming the file and the entry of the timeline that is wrong.
     """
