@@ -74,11 +74,6 @@ class KeyTimeline:
         object.__setattr__(self, '_changes_ns', tuple(states))
         object.__setattr__(self, '_states', tuple(states.values()))
 
-    @property
-    def end_s(self) -> float:
-        """Return the time from which no key is held [s]."""
-        return max((i.end_ns for i in self.intervals), default=0) / 1e9
-
     def keys_at(self, t_s: float) -> KeyState:
         """
         Return the keys held at a simulation time [s], rounded to the nearest nanosecond.
@@ -105,11 +100,6 @@ class JoyTimeline:
     times_s: tuple[float, ...]
     values: tuple[tuple[float, float, float], ...]
     held: KeyTimeline = KeyTimeline(())
-
-    @property
-    def end_s(self) -> float:
-        """Return the time from which nothing changes [s]."""
-        return max(self.times_s[-1], self.held.end_s)
 
     def raw_at(self, t_s: float) -> RawInput:
         """Return the raw device of `SCRIPTED_LAYOUT` at a simulation time [s]."""

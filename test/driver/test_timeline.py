@@ -99,11 +99,6 @@ def test_reverse_lasts_for_its_intervals() -> None:
         False, True, True, False]
 
 
-def test_ends() -> None:
-    """A timeline has an end, so a run can be as long as its script."""
-    assert (keys().end_s, joy().end_s) == (9.0, 3.5)
-
-
 @pytest.mark.parametrize('text', [
     KEYS, JOY, 'keys: []', 'joy: {points: [[0.000001, 1.0e-7, 0.1, 0.2]]}',
     'keys: [{from: 0.123456789, to: 1.0e-6, hold: left}]'.replace('1.0e-6', '12345.678901234')])
@@ -214,4 +209,7 @@ def test_the_documented_examples_are_read() -> None:
     text = (Path(__file__).parents[2] / 'docs' / 'driving.md').read_text(encoding='utf-8')
     blocks = [block.split('```')[0] for block in text.split('```yaml')[1:]]
     read = [parse_timeline(b, 'driving.md') for b in blocks if b.startswith(('\nkeys:', '\njoy:'))]
-    assert [timeline.end_s for timeline in read] == [8.0, 8.0]
+    keys, joy = read
+    assert isinstance(keys, KeyTimeline) and isinstance(joy, JoyTimeline)
+    assert [max(held.end_ns for held in timeline.intervals)
+            for timeline in (keys, joy.held)] == [8_000_000_000] * 2
