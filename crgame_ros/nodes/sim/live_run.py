@@ -324,7 +324,8 @@ class LiveRun:
 
     def _publish_seats(self) -> None:
         self._spells.note(self.simulation.n, self._inputs.seats.driven())
-        self._outputs.publish_seats(self._inputs.seats.document(), self._spells.document())
+        self._outputs.tell('/seats', self._inputs.seats.document())
+        self._outputs.tell('/seats/drivers', self._spells.document())
 
     def _queue_triggers(self) -> None:
         """Pass on the events triggered since the last tick."""

@@ -7,7 +7,6 @@ import math
 import time
 
 from crgame_ros.game.documents import EVENTS, FiredEvents, RUN_STATE
-from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.game.task_documents import TASK_LOG, TASK_STATE, TaskLog, TaskState
 from crgame_ros.messages.contract import load_contract
@@ -143,29 +142,15 @@ class SimOutputs:
         for name, text in document_texts(
                 self._setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
                 real_time_factor=factor, simulation=simulation).items():
-            self._latched[name].publish(String(data=text))
+            self.tell(name, text)
+
+    def tell(self, topic: str, text: str) -> None:
+        """Publish a document that late joiners get, too."""
+        self._latched[topic].publish(String(data=text))
 
     def publish_state(self, values: Mapping[str, object]) -> None:
         """Publish whether the run waits, goes on, stands still or is over."""
-        self._latched[RUN_STATE.topic].publish(String(
-            data=state_text(values, self._epoch, self._simulation)))
-
-    def publish_seats(self, seats: str, drivers: str) -> None:
-        """Publish the present drivers of the seats, and all drivers so far."""
-        self._latched['/seats'].publish(String(data=seats))
-        self._latched['/seats/drivers'].publish(String(data=drivers))
-
-    def publish_events(self, fired: Sequence[FiredEvent]) -> None:
-        """Publish the events that have taken effect so far."""
-        self._latched[EVENTS.topic].publish(
-            String(data=EVENTS.write(FiredEvents(self._epoch, tuple(fired)))))
-
-    def publish_tasks(self, simulation: Simulation, result: StepResult) -> None:
-        """Publish the new events of the game's tasks, and their state."""
-        self._latched[TASK_STATE.topic].publish(String(data=TASK_STATE.write(TaskState(
-            self._epoch, simulation.tasks_running, simulation.prompts))))
-        self._task_log.publish(String(
-            data=TASK_LOG.write(TaskLog(self._epoch, tuple(result.tasks)))))
+        self.tell(RUN_STATE.topic, state_text(values, self._epoch, self._simulation))
 
     def shows_vehicles(self, simulation: Simulation) -> bool:
         """Return whether the vehicles' own topics are to be published at this step."""
@@ -183,14 +168,18 @@ class SimOutputs:
         """Publish a step: requests first, because planners have the least time."""
         if result.fired:
             # An event may change the planner that the request is for.
-            self.publish_events(simulation.fired)
+            self.tell(EVENTS.topic,
+                      EVENTS.write(FiredEvents(self._epoch, tuple(simulation.fired))))
             for event in result.fired:
                 self._node.get_logger().info(
                     f'event {event.name} by {event.by} at n = {event.n} (k = {event.k})')
         for av_id, request in result.requests.items():
             self._publish_request(av_id, request)
         if result.tasks:
-            self.publish_tasks(simulation, result)
+            self.tell(TASK_STATE.topic, TASK_STATE.write(TaskState(
+                self._epoch, simulation.tasks_running, simulation.prompts)))
+            self._task_log.publish(String(
+                data=TASK_LOG.write(TaskLog(self._epoch, tuple(result.tasks)))))
         if result.n % self.publish_every and not result.tick:
             return
         stamp_ns = simulation.scheduler.stamp_ns(result.n)
@@ -250,7 +239,7 @@ class SimOutputs:
 
     def _publish_changed(self, topic: str, text: str | None) -> None:
         if text is not None:
-            self._latched[topic].publish(String(data=text))
+            self.tell(topic, text)
 
     def publish_rows(self) -> None:
         """Publish the cycles collected so far."""
