@@ -100,22 +100,20 @@ class DriverNode(PromptNode):
     def _on_game(self, message: String) -> None:
         try:
             game = GAME.read(message.data)
+            driver: DriverSource | None = None
             human = game.human(self._vehicle_id)
             if human is None:
                 self.get_logger().warning(f'{self._vehicle_id} takes no part in this game')
-                driver = None
             elif not self._choice and is_replay(human.driver):
                 self.get_logger().info(f'{self._vehicle_id}: the simulation repeats a recording')
-                driver = None
             else:
-                if (self._choice or human.driver).startswith(POLICY):
-                    self._code.check(self._choice or human.driver, f'{self._vehicle_id}: driver')
-                driver = live_driver(self._choice or human.driver,
-                                     '' if self._choice else human.timeline,
+                source = self._choice or human.driver
+                if source.startswith(POLICY):
+                    self._code.check(source, f'{self._vehicle_id}: driver')
+                driver = live_driver(source, '' if self._choice else human.timeline,
                                      self._vehicle_id, self._joy_map,
                                      self.get_logger().warning, self._policy_world)
-                self.get_logger().info(
-                    f'{self._vehicle_id}: driven by {self._choice or human.driver}')
+                self.get_logger().info(f'{self._vehicle_id}: driven by {source}')
         except CrgameError as error:
             self.get_logger().error(str(error))
             return
@@ -218,8 +216,7 @@ class DriverNode(PromptNode):
     def _log_problem(self) -> None:
         """Log each new problem with the device once, and its end."""
         assert self._driver is not None
-        problem: InputError | None = self._driver.problem
-        text = '' if problem is None else str(problem)
+        text = '' if self._driver.problem is None else str(self._driver.problem)
         if text == self._told:
             return
         self._told = text

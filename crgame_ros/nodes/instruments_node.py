@@ -167,7 +167,8 @@ class InstrumentsNode(Node):
             self._begin(message.data)
         for message in self._objects.waiting():
             self._world = WorldMessages(OBJECTS.read(message.data))
-        self._follow_clock()
+        for message in self._clocks.waiting():
+            self._endpoints.diagnostics.now_ns = from_time(message.clock)
         self._read_cycles()
         self._read_states()
         self._read_markers()
@@ -239,10 +240,6 @@ class InstrumentsNode(Node):
             self._triggers = None if spec.triggers is None else TriggerSender(
                 spec.triggers, self.get_logger().error)
         self._publish_streams(always=True)
-
-    def _follow_clock(self) -> None:
-        for message in self._clocks.waiting():
-            self._endpoints.diagnostics.now_ns = from_time(message.clock)
 
     def _read_cycles(self) -> None:
         for message in self._cycles.waiting():
