@@ -27,6 +27,7 @@ from crgame_ros.instruments.outlets import (
 )
 from crgame_ros.instruments.run_clock import CycleStarts
 from crgame_ros.instruments.triggers import TriggerSender
+from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.instrument_samples import (
     InstrumentStream,
     InstrumentStreams,
@@ -262,7 +263,7 @@ class InstrumentsNode(Node):
             if self._game is None or self._streams is None or self._world is None \
                     or not self._outlets:
                 continue
-            n = self._game.scheduler.step_of_stamp(from_time(message.header.stamp))
+            n = self._game.scheduler.step_of_stamp(stamp_of(message))
             try:
                 states = self._world.vehicle_states(message)
             except InputError:

@@ -7,11 +7,11 @@ from functools import partial
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.documents import GAME
+from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.joints import MAP
 from crgame_ros.occupancy.occupancy import OccupancyGrid
 from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.number_parameters import declare_number
 from crgame_ros.ros.spinning import poll
@@ -55,7 +55,7 @@ class MapNode(Node):
                 self._open(message.data)
             message = self._states.latest()
             if message is not None:
-                self._diagnostics.now_ns = from_time(message.header.stamp)
+                self._diagnostics.now_ns = stamp_of(message)
             if message is not None and self._map is not None:
                 points = np.array(message.points[0].positions).reshape(-1, JOINTS)[:, :2]
                 self._publish(self._near(self._map, points) or NOTHING)

@@ -10,12 +10,13 @@ import time
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import DrivenAv, SIGNALS, Signals
+from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.contract import load_contract
 from crgame_ros.messages.joints import from_joint_trajectory, MAP, WorldMessages
 from crgame_ros.nodes.markers.markers import SceneMarkers
 from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
-from crgame_ros.ros.messages import from_time, to_time
+from crgame_ros.ros.messages import to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.run_time import GameAwaited, RunTime, TimeCourse
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
@@ -152,24 +153,22 @@ class MarkerNode(Node):
             self._read_signals(signals.data)
             scene.set_signals(self._shown)
         message = self._objects.latest()
-        if message is not None and from_time(message.header.stamp) >= offset_ns:
+        if message is not None and stamp_of(message) >= offset_ns:
             # States of the game before or after this one are skipped.
             with suppress(InputError):
-                scene.set_objects(self._reader.object_states(message),
-                                  from_time(message.header.stamp))
+                scene.set_objects(self._reader.object_states(message), stamp_of(message))
         message = None if self._states is None else self._states.latest()
-        if message is not None \
-                and self._time.follow(from_time(message.header.stamp)) is TimeCourse.BACK:
+        if message is not None and self._time.follow(stamp_of(message)) is TimeCourse.BACK:
             # A recording is played again: viewers discard what they were shown.
             self._begin(documents)
             return False
-        if message is None or from_time(message.header.stamp) < offset_ns:
+        if message is None or stamp_of(message) < offset_ns:
             return False
         try:
             states = self._reader.vehicle_states(message)
         except InputError:
             return False
-        stamp_ns = self._endpoints.diagnostics.now_ns = from_time(message.header.stamp)
+        stamp_ns = self._endpoints.diagnostics.now_ns = stamp_of(message)
         scene.set_vehicles(states, stamp_ns)
         self._transforms.place_vehicles([item.id for item in documents.driven],
                                         states[:, :3].tolist(), stamp_ns)

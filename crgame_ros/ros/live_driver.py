@@ -25,9 +25,9 @@ from crgame_ros.driver.source import (
     ScriptedDriver,
 )
 from crgame_ros.errors import InputError
+from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.ros.diagnostics import Diagnostics
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
-from crgame_ros.ros.messages import from_time
 from crgame_ros.vehicle.parameters import VehicleParameters
 from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import JointState
@@ -143,8 +143,8 @@ class LiveForce:
         odom = self._motion.latest()
         if odom is not None:
             self._message.header.stamp = odom.header.stamp
-            force.see_motion(now_s, 1e-9 * from_time(odom.header.stamp),
-                             odom.twist.twist.linear.x, odom.twist.twist.angular.z)
+            force.see_motion(now_s, 1e-9 * stamp_of(odom), odom.twist.twist.linear.x,
+                             odom.twist.twist.angular.z)
         report = self._drivability.latest()
         if report is not None and report.status:
             values = {item.key: item.value for item in report.status[0].values}

@@ -10,10 +10,10 @@ from typing import Generic, TypeVar
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.objects import ObjectStates
+from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.joints import vehicles_from_joints, WorldMessages
 from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.node_main import StopFlag
 from crgame_ros.ros.run_time import RunTime, TimeCourse, USUAL_NS
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
@@ -130,13 +130,13 @@ class WorldFollower:
 
     def _receive_states(self) -> None:
         for message in self._states.waiting():
-            course = self._time.follow(_stamp_ns(message))
+            course = self._time.follow(stamp_of(message))
             if course is TimeCourse.AHEAD:
                 self._ahead.append(message)
                 continue
             if self._ahead and course is not TimeCourse.BEHIND:
                 # Time has moved on to there only if this message follows those.
-                if 0 <= _stamp_ns(message) - _stamp_ns(self._ahead[-1]) <= USUAL_NS:
+                if 0 <= stamp_of(message) - stamp_of(self._ahead[-1]) <= USUAL_NS:
                     self._waiting.extend(self._ahead)
                 self._ahead.clear()
             if course is TimeCourse.BACK:
@@ -151,7 +151,7 @@ class WorldFollower:
     def _receive_objects(self, scenario: ScenarioSet) -> None:
         scheduler = scenario.game.scheduler
         for message in self._objects.waiting():
-            n = scheduler.tick_of_stamp(from_time(message.header.stamp))
+            n = scheduler.tick_of_stamp(stamp_of(message))
             if n is None:
                 continue
             try:
@@ -166,7 +166,7 @@ class WorldFollower:
     def _complete(self, scenario: ScenarioSet, message: JointTrajectory) -> WorldStep | None:
         """Return a step, None if its objects have not come yet; n < 0: of another run."""
         scheduler = scenario.game.scheduler
-        n = scheduler.step_of_stamp(_stamp_ns(message))
+        n = scheduler.step_of_stamp(stamp_of(message))
         nothing = np.empty((0, 4))
         foreign = WorldStep(-1, False, nothing, nothing, nothing,
                             ObjectStates(nothing, nothing))
@@ -189,10 +189,6 @@ class WorldFollower:
         if self._latest is None:
             return foreign
         return WorldStep(n, tick, joints[0], joints[1], joints[2], self._latest)
-
-
-def _stamp_ns(message: JointTrajectory) -> int:
-    return from_time(message.header.stamp)
 
 
 class ObserverNode(Node, ABC, Generic[Observer]):

@@ -18,9 +18,9 @@ from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import EVENTS, GameDocument, SIGNALS
 from crgame_ros.game.task_documents import TASK_STATE
+from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
-from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.run_time import RunTime, TimeCourse
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.timing.cycle_rows import CycleTable
@@ -300,7 +300,7 @@ class CockpitFeed:
         frames = self._frames
         if message is None or frames is None or (place := frames.place_of(message)) is None:
             return
-        course = self._time.follow(from_time(message.header.stamp))
+        course = self._time.follow(stamp_of(message))
         if course is TimeCourse.BACK and self.scenario is not None:
             # A recording is played again.
             self._again += 1
@@ -311,7 +311,7 @@ class CockpitFeed:
         with suppress(InputError):
             states = frames.states(message)
             self.n = place.n
-            self._endpoints.diagnostics.now_ns = from_time(message.header.stamp)
+            self._endpoints.diagnostics.now_ns = stamp_of(message)
             self._hub.send_frame(*frames.state(place, states, self._commands))
 
     def _poll_objects(self) -> None:
@@ -354,7 +354,7 @@ class CockpitFeed:
         for slot in (self._diagnostics, *self._verdicts.values()):
             # The rest of a flood waits for the next call.
             for message in slot.waiting(QUEUE):
-                stamp_ns = from_time(message.header.stamp)
+                stamp_ns = stamp_of(message)
                 for status in message.status:
                     self._add_status(status, stamp_ns)
 

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import SeatOccupant
 from crgame_ros.game.task_documents import TASK_REPORT, TaskReport
+from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.joints import from_joint_trajectory, JointSeries
 from crgame_ros.messages.request_layout import request_head
 from crgame_ros.messages.status_values import read_status, status_truth
 from crgame_ros.planner.registry import EXTERNAL
 from crgame_ros.ros.diagnostics import complain
 from crgame_ros.ros.endpoints import Endpoints, SHARED_DEPTH
-from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.one_planner import OnePlanner
 from crgame_ros.ros.seats import Seats
 from crgame_ros.simulation.setup import Setup
@@ -167,7 +167,7 @@ class SimInputs:
         """Return (vehicle, n) of a violation that asks for a stop, None if there is none."""
         for vehicle_id, slot in self._drivability.items():
             for message in slot.waiting():
-                if from_time(message.header.stamp) < self._clock_offset_ns:
+                if stamp_of(message) < self._clock_offset_ns:
                     # A verdict on the run before the reset.
                     continue
                 for status in message.status:
