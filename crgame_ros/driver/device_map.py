@@ -310,8 +310,6 @@ class KeyEntry:
         Return the driving keys held.
 
         :param pressed: codes of all pressed keys.
-        :param reverse: whether reverse is selected.
-        :param lights: the lights that are switched on.
         """
         return KeyState(not pressed.isdisjoint(self.throttle), not pressed.isdisjoint(self.brake),
                         not pressed.isdisjoint(self.left), not pressed.isdisjoint(self.right),

@@ -22,15 +22,10 @@ class KeyState(NamedTuple):
     """
     Which driving keys are held: b_th, b_br, b_L, b_R of CRG III-C1.
 
-    :param throttle: a throttle key is held
-    :param brake: a brake key is held
-    :param left: a left key is held
-    :param right: a right key is held
     :param reverse: the reverse gear is requested; a device toggles it at each press of its key,
         the vehicle changes gear at standstill
     :param left_indicator: the left indicator is on; a device's lever switches it
     :param right_indicator: the right indicator is on; both together are the hazard lights
-    :param horn: the horn sounds
     :param put_back: the vehicle is to be put back on its lane
     """
 

@@ -172,13 +172,7 @@ class GearButtons:
     held: frozenset[int] = frozenset()
 
     def after(self, reverse: bool, button: int, pressed: bool) -> bool:
-        """
-        Return the gear after a button changed.
-
-        :param reverse: whether reverse was selected before.
-        :param button: the button that changed.
-        :param pressed: whether it is pressed now.
-        """
+        """Return the gear after a button changed."""
         if button in self.held:
             return pressed
         if not pressed:
@@ -226,7 +220,6 @@ def reported(axes: Mapping[int, float], layout: ControlLayout,
     would be half or full throttle; such an axis is left out and so counts as at rest.
 
     :param axes: raw value by code.
-    :param layout: the device's calibrated axes.
     :param known: axes that have reported before, whose 0 is real.
     """
     rests = {axis.code: axis.rest for axis in layout.ranges}
@@ -262,8 +255,6 @@ def normalize(raw: RawInput, layout: ControlLayout, reverse: bool = False,
     """
     Map raw values linearly to (p_th, p_br, s), without further conditioning (CRG 17).
 
-    :param raw: the device's reported values.
-    :param layout: the device's calibrated axes.
     :param reverse: the gear that its buttons have selected (`GearButtons.after`).
     :param lights: the lights that they have switched on (`IndicatorLever`).
     """

@@ -25,8 +25,6 @@ class SentTrigger(NamedTuple):
     """
     A byte that was written.
 
-    :param marker: for which.
-    :param code: the byte.
     :param at_s: when, on the steady clock [s]
     """
 

@@ -109,7 +109,6 @@ class SampleBatch(NamedTuple):
     """
     Samples of a stream of numbers.
 
-    :param stream: its number.
     :param times: (R, 5) as in `TIME_COLUMNS`
     :param values: (R, C) of its channels
     """

@@ -128,7 +128,6 @@ def plan_to_joints(plan: Plan, vehicle_id: str, time_step_ns: int) -> JointSerie
     """
     Return a plan as joints.
 
-    :param vehicle_id: the AV it is for.
     :param time_step_ns: Delta t_c [ns]
     """
     states = plan.states

@@ -34,7 +34,6 @@ class RayFan:
     first.
 
     :param field_of_view: full angle [rad]
-    :param rays: number of rays
     """
 
     def __init__(self, field_of_view: float, rays: int) -> None:

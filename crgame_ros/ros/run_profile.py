@@ -46,7 +46,6 @@ def check_believing(what: str) -> None:
     """
     Check that a profile can be given.
 
-    :param what: what needs it.
     :raises InputError: if it cannot.
     """
     if not can_believe():

@@ -30,7 +30,6 @@ def remove_half_made_ports(folder: Path = SHARED_MEMORY) -> list[str]:
     The ports of all ROS domains share their names. A process killed at the wrong moment would
     block the start of every later one that uses its port.
 
-    :param folder: where Fast DDS keeps its ports.
     :return: names of the ports that were removed
     """
     removed = []
@@ -56,7 +55,6 @@ def remove_stale(folder: Path = SHARED_MEMORY, *, ports: bool = False) -> tuple[
     These are files of this user only, which no visible process has mapped and whose lock no
     process holds. The kernel releases both with the process, however that ended.
 
-    :param folder: where Fast DDS keeps them.
     :param ports: remove ports too, 50 kB each. Their names are reused: a port that another process
         is just opening would be lost to the others, so the user chooses the moment.
     :return: number of files removed, and their size in shared memory [bytes]

@@ -99,7 +99,6 @@ class Body(Item):
 
         :param x: of its reference point in map, like y [m]
         :param yaw: [rad]
-        :param braking: whether it slows down.
         """
         self.present = math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)
         if not self.present:
@@ -219,7 +218,6 @@ def blank(header: Header, namespace: str, number: int, kind: int, paint: ColorRG
     Build a marker at the origin of map.
 
     :param header: shared by the markers of a message.
-    :param number: id, unique in the namespace.
     :param kind: Marker.CUBE …
     :param lifetime_s: time after which viewers drop it, 0 for never [s]
     """

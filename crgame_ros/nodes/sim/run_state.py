@@ -49,11 +49,7 @@ class RunState:
         self._shown_ns = self._show_until_ns = 0
 
     def publish(self, state: str, reason: str = '') -> None:
-        """
-        Publish a new state at once, and the present one every second.
-
-        :param reason: why the run has ended.
-        """
+        """Publish a new state at once, and the present one every second."""
         control, now_ns = self._control, time.monotonic_ns()
         news = (state, reason, control.awaited, control.countdown_s)
         if news == self._told and now_ns - self._told_ns <= NS_PER_S:

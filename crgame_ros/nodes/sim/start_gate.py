@@ -38,7 +38,6 @@ class StartGate:
     reports which companions it has heard.
 
     :param simulation: at step 0.
-    :param result: its first result.
     :param companions: nodes that must be connected, as `SimOutputs.missing` takes them.
     :param take_plan: passes an AV its new plan; returns whether it was accepted.
     :param traffic_answers: returns whether the agents of the next tick have come; None without
