@@ -51,8 +51,7 @@ ROUNDING = 1e-9
 class ObjectMotion(ABC):
     """The movement of one object; time is measured from the start of the run [s]."""
 
-    @abstractmethod
-    def decide(self, time_s: float, others: ObjectSurroundings) -> None:
+    def decide(self, others: ObjectSurroundings) -> None:  # noqa: B027 - some heed nobody
         """React to the others before a scenario time step; called for reactive objects only."""
 
     @abstractmethod
@@ -99,9 +98,6 @@ class Standstill(ObjectMotion):
     def __init__(self, pose: tuple[float, float, float]) -> None:
         self._pose = (pose[0], pose[1], wrap_pi(pose[2]))
 
-    def decide(self, time_s: float, others: ObjectSurroundings) -> None:
-        """Do nothing: the motion ignores others."""
-
     def move(self, time_s: float, duration_s: float) -> None:
         """Do nothing: the object stays."""
 
@@ -131,9 +127,6 @@ class Predetermined(ObjectMotion):
         self._columns[2] = np.unwrap(self._columns[2])
         self._stays, self._time_step_s = stays, time_step_s
         self._time_s = 0.0
-
-    def decide(self, time_s: float, others: ObjectSurroundings) -> None:
-        """Do nothing: the motion ignores others."""
 
     def move(self, time_s: float, duration_s: float) -> None:
         """Advance the current time."""

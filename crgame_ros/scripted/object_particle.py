@@ -230,7 +230,7 @@ class ParticleMotion(Integrated):
             wanted[-1] = 0.0
         return SpeedEnvelope(grid, wanted, self._type.deceleration)
 
-    def decide(self, time_s: float, others: ObjectSurroundings) -> None:
+    def decide(self, others: ObjectSurroundings) -> None:
         """Determine the arc length at which to stop."""
         if not self._gone:
             self._stop = self._crossing.stop(self._s, math.hypot(*self._velocity), others)

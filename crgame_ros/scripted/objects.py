@@ -187,7 +187,7 @@ class BicycleMotion(Integrated):
         # There is no leader until the first decision.
         self._following = math.inf
 
-    def decide(self, time_s: float, others: ObjectSurroundings) -> None:
+    def decide(self, others: ObjectSurroundings) -> None:
         """Find the leader on the path, and the acceleration behind it."""
         if self._gone:
             return
@@ -320,7 +320,7 @@ class ScriptedObjects:
                 if self._particles[index]:
                     # People yield to each other and are no obstacles.
                     own &= ~self._particles
-                self._motions[index].decide(time_s, everything.chosen(seen))
+                self._motions[index].decide(everything.chosen(seen))
         for motion in self._motions:
             motion.move(time_s, self._time_step_s)
         self.k = k + 1
