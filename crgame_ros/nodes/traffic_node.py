@@ -124,7 +124,7 @@ class TrafficNode(Node):
             self._agents.publish(self._message.message)
             return
         begin_s = time.perf_counter()
-        view = self._reader.view(k, step.positions, step.velocities, step.objects)
+        view = self._reader.view(k, step.joints[0], step.joints[1], step.objects)
         traffic = self._traffic
         if traffic is None or k != self._k:
             traffic = self._made(view, k, step)

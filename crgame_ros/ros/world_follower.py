@@ -40,23 +40,19 @@ class WorldStep:
 
     :param n: simulation step.
     :param tick: whether the objects are new.
-    :param positions: (V, 4) joints of the driven vehicles
-    :param velocities: (V, 4)
-    :param accelerations: (V, 4)
+    :param joints: (3, V, 4) positions, velocities and accelerations of the driven vehicles' joints
     :param objects: all other objects, at the last tick.
     """
 
     n: int
     tick: bool
-    positions: FloatArray
-    velocities: FloatArray
-    accelerations: FloatArray
+    joints: FloatArray
     objects: ObjectStates
 
     @property
     def states(self) -> FloatArray:
         """Return the driven vehicles' states, (V, 8)."""
-        return vehicles_from_joints(self.positions, self.velocities, self.accelerations)
+        return vehicles_from_joints(*self.joints)
 
 
 class WorldFollower:
@@ -167,9 +163,8 @@ class WorldFollower:
         """Return a step, None if its objects have not come yet; n < 0: of another run."""
         scheduler = scenario.game.scheduler
         n = scheduler.step_of_stamp(stamp_of(message))
-        nothing = np.empty((0, 4))
-        foreign = WorldStep(-1, False, nothing, nothing, nothing,
-                            ObjectStates(nothing, nothing))
+        nothing = np.empty((3, 0, 4))
+        foreign = WorldStep(-1, False, nothing, ObjectStates(nothing[0], nothing[1]))
         try:
             joints = self._reader.vehicle_joints(message)
         except InputError:
@@ -188,7 +183,7 @@ class WorldFollower:
                                   if at > n}
         if self._latest is None:
             return foreign
-        return WorldStep(n, tick, joints[0], joints[1], joints[2], self._latest)
+        return WorldStep(n, tick, joints, self._latest)
 
 
 class ObserverNode(Node, ABC, Generic[Observer]):
