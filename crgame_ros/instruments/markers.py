@@ -9,13 +9,12 @@ other tools choose epochs: `stimulus/drt/hv0/3` is one of `stimulus` and of `sti
 
 from typing import NamedTuple
 
+from crgame_ros.driver.seat_state import RETURNING
 from crgame_ros.game.documents import FiredEvents, RunState
 from crgame_ros.game.seat_documents import DrivingSpell, DrivingSpells
 from crgame_ros.game.task_documents import TaskEntry, TaskLog
 from crgame_ros.messages.status_values import Status
 
-# The source of an AV that follows its plan.
-_PLANNER = 'planner'
 _KINDS = {'begin': 'task/begin', 'end': 'task/end', 'stimulus': 'stimulus',
           'request': 'take_over/request', 'shown': 'shown', 'answer': 'answer',
           'unrequested': 'answer/unrequested', 'missed': 'missed', 'over': 'take_over/over'}
@@ -108,7 +107,7 @@ class RunMarkers:
                 continue
             self._drivers[spell.seat] = spell
             if before is not None and spell.source != before.source:
-                word = 'back' if spell.source in (_PLANNER, 'game') else 'driven'
+                word = 'back' if spell.source in RETURNING else 'driven'
                 found.append(Marker(_words('take_over', word, spell.seat, spell.source),
                                     spell.from_n))
         return found

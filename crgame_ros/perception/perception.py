@@ -152,7 +152,6 @@ class Perception:
         self._to_center = np.array([d.rear_to_center for d in descriptions[:self._vehicles]])
         self._static = np.array([d.role is Role.STATIC for d in descriptions], dtype=bool)
         self._transform = transform
-        self._dt_s = dt_s
         self._memory = round(spec.memory / dt_s)
         self._occupancy = occupancy
         self._localisation = None if spec.localisation is None else Localisation(
