@@ -92,12 +92,12 @@ class SimOutputs:
         self._setup = setup
         endpoints = Endpoints(node)
         self.publish_every = steps_between_messages(setup.game.timing.rate)
-        self._clock = endpoints.publisher('/clock')
-        self._state = endpoints.publisher('/vehicles/state')
-        # For nodes that need ticks only: each reader of each step costs the loop time.
-        self._tick_state = endpoints.publisher('/vehicles/tick_state')
-        self._objects = endpoints.publisher('/traffic/objects')
-        self._cycle = endpoints.publisher('/timing/cycle')
+        # Ticks have states of their own: each reader of each step costs the loop time.
+        self._steps = {name: endpoints.publisher(name) for name in (
+            '/clock', '/vehicles/state', '/vehicles/tick_state', '/traffic/objects',
+            '/timing/cycle')}
+        self._clock, self._state, self._tick_state, self._objects, self._cycle = \
+            self._steps.values()
         self._latched = {name: endpoints.publisher(name) for name in (
             '/scenario/xml', '/scenario/game', '/scenario/objects', '/scenario/events',
             '/scenario/signals', '/vehicles/signals', '/seats', '/seats/drivers', TASK_STATE.topic,
@@ -257,23 +257,14 @@ class SimOutputs:
         """
         topics = load_contract().topics
         found: set[str] = set()
-        for name, publishers in {
-                '/clock': {'': self._clock}, '/vehicles/state': {'': self._state},
-                '/vehicles/tick_state': {'': self._tick_state},
-                '/traffic/objects': {'': self._objects}, '/timing/cycle': {'': self._cycle},
-                '/<av>/plan_request': self._requests_as('/<av>/plan_request'),
-                '/<av>/true_request': self._requests_as('/<av>/true_request'),
-                }.items():
-            consumers = topics[name].consumers
-            for vehicle_id, publisher in publishers.items():
-                expected = {item for item in companions if _consumes(item, consumers, vehicle_id)}
-                found |= expected - self._connected(publisher, expected)
+        for name, vehicle_id, publisher in (
+                *((name, '', publisher) for name, publisher in self._steps.items()),
+                *((self._request_topics[av], av, publisher)
+                  for av, publisher in self._requests.items())):
+            expected = {item for item in companions
+                        if _consumes(item, topics[name].consumers, vehicle_id)}
+            found |= expected - self._connected(publisher, expected)
         return found
-
-    def _requests_as(self, name: str) -> dict[str, Publisher]:
-        """Return the publishers of requests on a topic."""
-        return {av: publisher for av, publisher in self._requests.items()
-                if self._request_topics[av] == name}
 
     def _connected(self, publisher: Publisher, expected: set[str]) -> set[str]:
         """Return the companions connected to a topic: all or none, as DDS gives no names."""
@@ -295,10 +286,9 @@ class SimOutputs:
 
     def destroy(self) -> None:
         """Release the publishers, for a game with other vehicles."""
-        publishers = [self._clock, self._state, self._tick_state, self._objects, self._cycle,
-                      self._task_log, *self._latched.values(), *self._requests.values()]
-        publishers += [item for vehicle in self._vehicles for item in vehicle.publishers]
-        for publisher in publishers:
+        vehicles = [item for vehicle in self._vehicles for item in vehicle.publishers]
+        for publisher in (*self._steps.values(), *self._latched.values(), self._task_log,
+                          *self._requests.values(), *vehicles):
             self._node.destroy_publisher(publisher)
 
 
