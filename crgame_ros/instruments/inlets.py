@@ -179,7 +179,7 @@ class Inlets:
         for key, info in found.items():
             self._note(key, info)
         for key in self._streams.keys() - found.keys():
-            self._leave(key, 'is gone')
+            self._leave(key)
 
     def poll(self) -> list[Batch]:
         """Return the samples that have come, by stream and in their order."""
@@ -192,7 +192,7 @@ class Inlets:
             except self._lost:
                 inlet.lost = True
                 self._gone_s[inlet.uid] = time.monotonic()
-                self._leave(key, 'is gone')
+                self._leave(key)
                 continue
             stream = self._streams[key]
             if (inlet.stream.channels, inlet.stream.units) != (stream.channels, stream.units):
@@ -231,11 +231,11 @@ class Inlets:
         self._change(key, inlet.stream)
         self._say(f'recording the stream {_title(inlet.stream)} from {inlet.stream.host}')
 
-    def _leave(self, key: str, what: str) -> None:
+    def _leave(self, key: str) -> None:
         stream = self._streams[key]
         if stream.here:
             self._change(key, replace(stream, here=False))
-            self._say(f'stream {_title(stream)} {what}')
+            self._say(f'stream {_title(stream)} is gone')
 
     def _change(self, key: str, stream: InstrumentStream) -> None:
         self._streams[key] = stream

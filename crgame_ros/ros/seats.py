@@ -212,18 +212,15 @@ class SeatSpells:
                 del self._last[seat]
         for seat, item in driven.items():
             if seat not in self._last:
-                self._begin(seat, DrivingSpell(*item, n))
+                spell = self._last[seat] = DrivingSpell(*item, n)
+                if len(self._spells) < MAX_SPELLS:
+                    self._spells.append(spell)
         # Nothing was driven in a period without steps.
         self._spells = [item for item in self._spells if item.until_n != item.from_n]
 
     def document(self) -> str:
         """Return the text of `/seats/drivers`."""
         return DRIVERS.write(DrivingSpells(self._epoch, tuple(self._spells)))
-
-    def _begin(self, seat: str, spell: DrivingSpell) -> None:
-        if len(self._spells) < MAX_SPELLS:
-            self._spells.append(spell)
-        self._last[seat] = spell
 
 
 # Orders read in one cycle: a flood must not cost it.

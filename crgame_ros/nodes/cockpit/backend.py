@@ -262,9 +262,6 @@ class LiveBackend:
         if not client.rights.directs:
             raise CrgameError('only a director can start this run; a driver in its seat says '
                               'that they are ready')
-        return await self._steer(client, action)
-
-    async def _steer(self, client: Client, action: str) -> str:
         text = await self._orders.control(action)
         self._announce(client, _DEEDS[action])
         return text
