@@ -19,7 +19,6 @@ from pathlib import Path
 import signal
 import sys
 import traceback
-from typing import NoReturn
 
 from crgame_ros.launcher.interruption import ENDING
 from crgame_ros.processes import name_process, PARENT_VARIABLE
@@ -183,7 +182,7 @@ def _fork_node(module: str, arguments: Sequence[str], nice: int) -> tuple[int, i
         sys.stdout.flush()
         sys.stderr.flush()
         # The launcher's own work on the stack below must not go on here.
-        _end(code)
+        os._exit(code & 0xff)
 
 
 def _detach(output: int) -> None:
@@ -217,7 +216,3 @@ def _run(name: str, arguments: Sequence[str]) -> int:
         print(end.code, file=sys.stderr)
         return 1
     return 0
-
-
-def _end(code: int) -> NoReturn:
-    os._exit(code & 0xff)

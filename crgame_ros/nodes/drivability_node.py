@@ -2,15 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """drivability_node: collision and road compliance of every driven vehicle (CRG III-D)."""
 
-from collections.abc import Sequence
 from functools import partial
 import time
 
-from crgame_ros.drivability.monitor import (
-    drivability_status,
-    DrivabilityMonitor,
-    VehicleDrivability,
-)
+from crgame_ros.drivability.monitor import drivability_status, DrivabilityMonitor
 from crgame_ros.game.game import DrivabilitySpec
 from crgame_ros.ros.node_main import run_node
 from crgame_ros.ros.world_follower import ObserverNode
@@ -51,10 +46,7 @@ class DrivabilityNode(ObserverNode[DrivabilityMonitor]):
             self._heartbeat_s = time.monotonic()
             due = observer.verdicts
         self._listeners = listeners
-        self._report(due, stamp_ns)
-
-    def _report(self, verdicts: Sequence[VehicleDrivability], stamp_ns: int) -> None:
-        for verdict in verdicts:
+        for verdict in due:
             self._reports[verdict.vehicle_id].publish(self.endpoints.diagnostics.array_of(
                 drivability_status(verdict, self._spec), stamp_ns))
 

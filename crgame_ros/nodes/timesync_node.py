@@ -77,7 +77,10 @@ class TimesyncNode(Node):
         if course in (TimeCourse.ON, TimeCourse.BACK):
             self._metrics.add_rows(table.timing_rows())
             self._late.add_table(table)
-            self._order(table.column('cumulative_error_s')[-1])
+            # An order to skip frames, or its end (CRG III-A2a, mechanism 2).
+            lag_s = float(table.column('cumulative_error_s')[-1])
+            if self._skipping.update(lag_s, time.monotonic()):
+                self._orders.publish(Bool(data=self._skipping.active))
             self._diagnostics.now_ns = stamp_ns
 
     def _begin(self, text: str) -> None:
@@ -95,11 +98,6 @@ class TimesyncNode(Node):
         self._skipping = FrameSkipping(game.timing)
         # Cancel an order of the previous run or of a supervisor that was killed.
         self._orders.publish(Bool(data=False))
-
-    def _order(self, lag_s: float) -> None:
-        """Order frame skipping, or its end (CRG III-A2a, mechanism 2)."""
-        if self._skipping.update(float(lag_s), time.monotonic()):
-            self._orders.publish(Bool(data=self._skipping.active))
 
     def _report(self, metrics: TimingMetrics) -> None:
         summary = metrics.summary()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from crgame_ros.driver.device_map import load_device_map
 from crgame_ros.driver.evdev_device import EvdevDevice, open_evdev
-from crgame_ros.driver.force_feedback import FeltForce, ForceFeedback
+from crgame_ros.driver.force_feedback import ForceFeedback
 from crgame_ros.driver.input_delay import InputDelay
 from crgame_ros.driver.source import (
     COCKPIT,
@@ -133,7 +133,9 @@ class LiveForce:
                 if felt is None:
                     pause_s = LOOK_S
                 else:
-                    self._publish(felt)
+                    self._message.position = [felt.wheel_angle]
+                    self._message.effort = [felt.torque]
+                    self._publisher.publish(self._message)
                     pause_s = max(0.0, REFRESH_S - (time.monotonic() - start_s))
         finally:
             force.close()
@@ -150,11 +152,6 @@ class LiveForce:
             values = {item.key: item.value for item in report.status[0].values}
             force.see_drivability(values.get('collision') == 'true',
                                   values.get('road_compliance') == 'false')
-
-    def _publish(self, felt: FeltForce) -> None:
-        self._message.position = [felt.wheel_angle]
-        self._message.effort = [felt.torque]
-        self._publisher.publish(self._message)
 
 
 class DeviceDelay:

@@ -187,7 +187,9 @@ class SimulationInterfaces:
                 'RESULT_FEATURE_UNSUPPORTED', 'only the scopes default, all and state: time never '
                 'goes back, and nothing is spawned')
             return response
-        response.result = self._after_reset(await self._control.reset())
+        problem = await self._control.reset()
+        response.result = self._told('RESULT_OK') if problem is None else self._told(
+            'RESULT_OPERATION_FAILED', problem)
         return response
 
     def on_get_world(self, _: object, response: 'srv.GetCurrentWorld.Response') -> object:
@@ -264,10 +266,6 @@ class SimulationInterfaces:
         return None if n is not None else self._told(
             'RESULT_OPERATION_FAILED', f'{order.count} of {order.steps} steps done: the order was '
             'cancelled, or the run goes on or is over')
-
-    def _after_reset(self, problem: str | None) -> object:
-        return self._told('RESULT_OK') if problem is None else self._told(
-            'RESULT_OPERATION_FAILED', problem)
 
     def _tell(self, goal: 'ServerGoalHandle', count: int) -> None:
         """Tell how many steps of a goal are done; a failure costs only this."""
