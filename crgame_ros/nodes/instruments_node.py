@@ -69,7 +69,12 @@ class RunStreams:
     """
 
     def __init__(self, game: GameDocument, outlets: dict[str, Outlet]) -> None:
-        self._game, self._outlets = game, outlets
+        self._every = steps_between_messages(game.timing.rate)
+        self._drivers = {vehicle.id: outlets.get(driver_stream(vehicle.id, 0.0).name)
+                         for vehicle in game.vehicles}
+        self._vehicles = [outlets.get(vehicle_stream(vehicle.id, 0.0).name)
+                          for vehicle in game.vehicles]
+        self._marked = outlets.get(MARKERS.name)
         self.starts = CycleStarts(game.scheduler.dt_s)
         self._states: deque[tuple[int, NDArray[np.float64]]] = deque(maxlen=WAITING)
         self._markers: deque[Marker] = deque(maxlen=WAITING)
@@ -80,17 +85,15 @@ class RunStreams:
 
     def add_cycles(self, table: CycleTable) -> None:
         """Add cycles, and send what their drivers did."""
-        every = steps_between_messages(self._game.timing.rate)
         starts = {int(n): start for n, start in table.steady_rows().tolist()}
         for n, start_s in starts.items():
             self.starts.add(n, start_s)
-        for vehicle in self._game.vehicles[:MAX_VEHICLES]:
-            outlet = self._outlets.get(driver_stream(vehicle.id, 0.0).name)
+        for vehicle_id, outlet in self._drivers.items():
             if outlet is None:
                 continue
             for n, row in zip(table.column('n').astype(int).tolist(),
-                              table.commands(vehicle.id).tolist(), strict=True):
-                if n in starts and n % every == 0:
+                              table.commands(vehicle_id).tolist(), strict=True):
+                if n in starts and n % self._every == 0:
                     outlet.push(row, starts[n])
 
     def add_markers(self, markers: Sequence[Marker]) -> None:
@@ -103,17 +106,15 @@ class RunStreams:
         while newest is not None and self._states and self._states[0][0] <= newest:
             n, states = self._states.popleft()
             start_s = self.starts.steady_s(n)
-            for vehicle, state in zip(self._game.vehicles, states, strict=True):
-                outlet = self._outlets.get(vehicle_stream(vehicle.id, 0.0).name)
+            for outlet, state in zip(self._vehicles, states, strict=True):
                 if outlet is not None and start_s is not None:
                     outlet.push(state.tolist(), start_s)
         while newest is not None and self._markers and (self._markers[0].n or 0) <= newest:
             marker = self._markers.popleft()
             start_s = self.starts.steady_s(newest if marker.n is None else marker.n)
-            outlet = self._outlets.get(MARKERS.name)
-            if outlet is not None and start_s is not None:
-                outlet.push([marker.text], start_s + marker.after_s
-                            if marker.steady_s is None else marker.steady_s)
+            if self._marked is not None and start_s is not None:
+                self._marked.push([marker.text], start_s + marker.after_s
+                                  if marker.steady_s is None else marker.steady_s)
 
 
 class InstrumentsNode(Node):
