@@ -9,6 +9,7 @@ import math
 
 from crgame_ros.errors import InputError
 from crgame_ros.timing.late_step import Causes, NO_CAUSES, Phase
+from crgame_ros.timing.metrics import ROW_COLUMNS
 from crgame_ros.timing.time_controller import Cycle
 import numpy as np
 from numpy.typing import NDArray
@@ -141,8 +142,7 @@ class CycleTable:
 
     def timing_rows(self) -> NDArray[np.float64]:
         """Return (R, 4) rows as `TimingMetrics.add_rows` takes them."""
-        return self.rows[:, [self._place[name] for name in
-                             ('ideal_s', 'actual_s', 'busy_s', 'dropped_s')]]
+        return self.rows[:, [self._place[name] for name in ROW_COLUMNS]]
 
     def late_rows(self) -> NDArray[np.float64] | None:
         """Return (R, 9) causes of lateness and phase of each row; None where they are missing."""

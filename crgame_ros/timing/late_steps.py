@@ -23,9 +23,6 @@ import numpy as np
 WORST = 10
 _WORTH_A_WORD = 0.02
 _MS = 1e3
-# Keys of `late_steps` in `timing.json`.
-LATE_KEYS = frozenset(('threshold_ms', 'count', 'late_ms', 'by_cause', 'resets_from_outside',
-                       'resets_of_ours', 'worst'))
 _PHASES = frozenset(map(int, Phase))
 
 
@@ -147,3 +144,7 @@ class LateSteps:
             'resets_of_ours': sum(count for cause, count in resets.items()
                                   if cause not in FROM_OUTSIDE),
             'worst': [step.as_dict() for step in self.worst]}
+
+
+# Keys of `late_steps` in `timing.json`.
+LATE_KEYS = frozenset(LateSteps().as_dict() or ())
