@@ -163,18 +163,21 @@ class Endpoints:
         self._contract = load_contract()
         # rclpy keeps callback groups by weak reference only.
         self._polled_group = PolledGroup()
+        # What has been created, and how it is destroyed.
+        self._made: WeakKeyDictionary[Any, Callable[[Any], object]] = WeakKeyDictionary()
         # One of each for all endpoints of a node.
         if node not in _TOLD:
             diagnostics = Diagnostics(node, self.publisher('/diagnostics'))
             _TOLD[node] = diagnostics, Refusals(node, diagnostics)
+            self._made.clear()
         self.diagnostics, self.refusals = _TOLD[node]
 
     def publisher(self, name: str, vehicle_id: str = '') -> Publisher:
         """Create a publisher."""
         topic = self._contract.topics[name]
-        return self._node.create_publisher(
+        return self._noted(self._node.create_publisher(
             message_type(topic.type_name), relative(topic.name_for(vehicle_id)),
-            qos_profile(topic.qos))
+            qos_profile(topic.qos)), self._node.destroy_publisher)
 
     def subscription(self, name: str, callback: Callable[[object], None],
                      vehicle_id: str = '') -> Subscription:
@@ -190,9 +193,9 @@ class Endpoints:
                 return
             callback(message)
 
-        return self._node.create_subscription(
+        return self._noted(self._node.create_subscription(
             message_type(topic.type_name), relative(intake.name), read, qos_profile(topic.qos),
-            raw=True)
+            raw=True), self._node.destroy_subscription)
 
     def polled(self, name: str, vehicle_id: str = '', *, raw: bool = False,
                depth: int | None = None, strict: bool = False,
@@ -211,9 +214,9 @@ class Endpoints:
         if depth is not None:
             profile.depth = depth
         intake = MessageValidator(topic, topic.name_for(vehicle_id))
-        subscription = self._node.create_subscription(
+        subscription = self._noted(self._node.create_subscription(
             message_type(topic.type_name), relative(intake.name), _unused, profile,
-            callback_group=self._polled_group, raw=True)
+            callback_group=self._polled_group, raw=True), self._node.destroy_subscription)
         read = intake.verify if verify else intake.bound if raw else intake.read
         return PolledSubscription(subscription, intake.name, read,
                                   None if strict else self.refusals.note, sent)
@@ -228,13 +231,24 @@ class Endpoints:
         """Destroy a subscription."""
         self._node.destroy_subscription(slot.subscription)
 
+    def destroy(self) -> None:
+        """Destroy the publishers, subscriptions and services that are left of these endpoints."""
+        for entity, destroy in list(self._made.items()):
+            destroy(entity)
+        self._made.clear()
+
+    def _noted(self, entity: T, destroy: Callable[[T], object]) -> T:
+        self._made[entity] = destroy
+        return entity
+
     def service(self, name: str, callback: Callable[[object, object], object],
                 vehicle_id: str = '', group: CallbackGroup | None = None) -> Service:
         """Create a service, whose queue holds a burst of calls until they are answered."""
         row = self._contract.services[name]
-        return self._node.create_service(
+        return self._noted(self._node.create_service(
             message_type(row.type_name), relative(name.replace('<av>', vehicle_id)), callback,
-            qos_profile=QoSProfile(depth=SERVICE_DEPTH), callback_group=group)
+            qos_profile=QoSProfile(depth=SERVICE_DEPTH), callback_group=group),
+            self._node.destroy_service)
 
     def action(self, name: str, execute: 'Callable[[ServerGoalHandle], object]',
                cancel: 'Callable[[ServerGoalHandle], bool]',

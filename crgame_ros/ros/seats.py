@@ -264,11 +264,6 @@ class Seats:
                 # Readiness does not carry over to the next run.
                 seat.tenant = replace(tenant, ready=False)
 
-    @property
-    def slots(self) -> list[PolledSubscription]:
-        """Return every subscription, to release it."""
-        return [self._orders, *(seat.commands for seat in self.all)]
-
     def listen(self, now_ns: int) -> None:
         """Read the commands that have come by now, so that the cycle has less to read."""
         for seat in self.all:

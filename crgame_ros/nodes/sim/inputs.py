@@ -42,19 +42,17 @@ class SimInputs:
     :param tenants: occupants by seat.
     """
 
-    def __init__(self, node: Node, setup: Setup, clock_offset_ns: int,
+    def __init__(self, node: Node, endpoints: Endpoints, setup: Setup, clock_offset_ns: int,
                  seat_sources: MutableMapping[str, str],
                  recorded: 'RecordedInputs | None' = None,
                  tenants: MutableMapping[str, SeatOccupant] | None = None) -> None:
         self._node = node
         self._clock_offset_ns = clock_offset_ns
-        endpoints = Endpoints(node)
         self.seats = Seats(endpoints, setup, clock_offset_ns, seat_sources, recorded, tenants)
         # Orders to planners to start or stop, until the loop reads them.
         self.planner_orders: dict[str, bool] = {}
-        self._services = [
+        for av in setup.avs:
             endpoints.service('/<av>/planner_run', partial(self._on_planner_run, av.id), av.id)
-            for av in setup.avs]
         self._plans = {
             av.id: endpoints.polled('/<av>/plan', av.id, strict=True, depth=SHARED_DEPTH,
                                     sent=True)
@@ -175,14 +173,3 @@ class SimInputs:
                     if status_truth(values, 'stop'):
                         return vehicle_id, values.get('n', '')
         return None
-
-    def destroy(self) -> None:
-        """Release the subscriptions, for a game with other vehicles."""
-        slots = [*self.seats.slots, *self._plans.values(),
-                 *self._drivability.values(), *self._perceived.values(), self._frame_skip,
-                 self._triggers, *([] if self._agents is None else [self._agents]),
-                 *([] if self._task_reports is None else [self._task_reports])]
-        for slot in slots:
-            self._node.destroy_subscription(slot.subscription)
-        for service in self._services:
-            self._node.destroy_service(service)

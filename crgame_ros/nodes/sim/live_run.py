@@ -115,9 +115,10 @@ class LiveRun:
         self._executor = executor
         self._control = control
         self._epoch = epoch
-        self._outputs = SimOutputs(node, setup)
-        self._inputs = SimInputs(
-            node, setup, clock_offset_ns, control.seat_sources, recorded, control.seat_tenants)
+        endpoints = self._endpoints = Endpoints(node)
+        self._outputs = SimOutputs(node, endpoints, setup)
+        self._inputs = SimInputs(node, endpoints, setup, clock_offset_ns, control.seat_sources,
+                                 recorded, control.seat_tenants)
         scheduler = replace(setup.scheduler, clock_offset_ns=clock_offset_ns)
         feed = None if setup.traffic is None else RemoteTraffic(
             self._inputs.pop_agents, setup.traffic, scheduler)
@@ -128,8 +129,7 @@ class LiveRun:
         self._pacer = Pacer(lambda: self._serve(0.0), self._controller, self._dt_s,
                             setup.game.timing.max_catch_up_steps)
         self._watch = StepWatch()
-        self._diagnostics = LiveDiagnostics(Endpoints(node).diagnostics, self.simulation,
-                                            self._inputs)
+        self._diagnostics = LiveDiagnostics(endpoints.diagnostics, self.simulation, self._inputs)
         self._failures = {av.id: FailureLines(av.id, node.get_logger().warning)
                           for av in setup.avs}
         self._state = RunState(self._outputs, self.simulation, self._diagnostics, control)
@@ -148,7 +148,7 @@ class LiveRun:
         """Run until the game's end, a reset or a stop."""
         self._stop = stop
         # Before the documents, upon which the recorder opens its bag and reports it.
-        heard = HeardTopics(Endpoints(self._node), self.simulation.scheduler.clock_offset_ns) \
+        heard = HeardTopics(self._endpoints, self.simulation.scheduler.clock_offset_ns) \
             if 'recorder_node' in self._control.companions else None
         self._outputs.publish_documents(
             self._epoch, self.simulation.scheduler.clock_offset_ns,
@@ -204,8 +204,7 @@ class LiveRun:
 
     def destroy(self) -> None:
         """Release the endpoints."""
-        self._outputs.destroy()
-        self._inputs.destroy()
+        self._endpoints.destroy()
         self._watch.close()
 
     def _serve(self, timeout_s: float) -> None:

@@ -87,10 +87,9 @@ class VehicleOutputs:
 class SimOutputs:
     """The publishers of sim_node for one game."""
 
-    def __init__(self, node: Node, setup: Setup) -> None:
+    def __init__(self, node: Node, endpoints: Endpoints, setup: Setup) -> None:
         self._node = node
         self._setup = setup
-        endpoints = Endpoints(node)
         self.publish_every = steps_between_messages(setup.game.timing.rate)
         # Ticks have states of their own: each reader of each step costs the loop time.
         self._steps = {name: endpoints.publisher(name) for name in (
@@ -283,13 +282,6 @@ class SimOutputs:
                           self._task_log):
             left_s = max(0.0, until_s - time.monotonic())
             publisher.wait_for_all_acked(Duration(seconds=left_s))
-
-    def destroy(self) -> None:
-        """Release the publishers, for a game with other vehicles."""
-        vehicles = [item for vehicle in self._vehicles for item in vehicle.publishers]
-        for publisher in (*self._steps.values(), *self._latched.values(), self._task_log,
-                          *self._requests.values(), *vehicles):
-            self._node.destroy_publisher(publisher)
 
 
 def _consumes(companion: str, consumers: Sequence[str], vehicle_id: str) -> bool:
