@@ -131,18 +131,13 @@ def _cuts(roads: WaypointRoads, links: Mapping[int, LaneLinks],
             cuts[lane] = [0.5 * road.length]
     waiting = [(lane, s) for lane, own in cuts.items() for s in own]
     for lane, s in waiting:
-        for other in _beside(links[lane]):
+        for other in links[lane].beside:
             station = _across(roads, lane, s, other)
             near_end = min(station, roads.lane(other).length - station) < SNAP
             if not near_end and all(abs(station - cut) >= SNAP for cut in cuts[other]):
                 insort(cuts[other], station)
                 waiting.append((other, station))
     return cuts
-
-
-def _beside(near: LaneLinks) -> list[int]:
-    return [other for other in (near.left, near.right, near.oncoming_left, near.oncoming_right)
-            if other is not None]
 
 
 def _across(roads: WaypointRoads, lane: int, s: float, other: int) -> float:

@@ -54,8 +54,12 @@ class LaneLinks:
     @property
     def named(self) -> tuple[int, ...]:
         """Return all lanes in the links."""
-        beside = (self.left, self.right, self.oncoming_left, self.oncoming_right)
-        return (*self.successors, *self.predecessors, *(x for x in beside if x is not None))
+        return (*self.successors, *self.predecessors, *self.beside)
+
+    @property
+    def beside(self) -> tuple[int, ...]:
+        """Return the neighbours."""
+        return tuple(lane for name in _SINGLE if (lane := getattr(self, name)) is not None)
 
     def only(self, lane_ids: Collection[int]) -> 'LaneLinks':
         """Return the links without other lanes."""
@@ -128,7 +132,7 @@ class WaypointRoads:
         lanes, links = {}, {}
         for lane, entry in rows.items():
             try:
-                lanes[lane] = WaypointLane.from_rows(entry.points, kinds)
+                lanes[lane] = WaypointLane.from_rows(np.array(entry.points), kinds)
             except InputError as error:
                 raise InputError(error.what, f'{path}, line {entry.line}, lane {lane}',
                                  error.remedy) from error
@@ -142,10 +146,24 @@ class WaypointRoads:
         return cls(lanes, links)
 
     def to_csv(self, path: Path) -> None:
-        """Write the way-points so that `from_csv` gives the same roads to the last bit."""
-        _write_lane_rows(path, {
-            lane: LaneRows(0, road.rows, self._links[lane])
-            for lane, road in self._lanes.items()})
+        """
+        Write the way-points so that `from_csv` gives the same roads to the last bit.
+
+        :raises InputError: if the file cannot be written.
+        """
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator='\n')
+        writer.writerow(('lane', *_NUMBERS, *_LISTS, *_SINGLE))
+        for lane, road in self._lanes.items():
+            near = self._links[lane]
+            links = [' '.join(map(str, getattr(near, name))) for name in _LISTS]
+            links += ['' if (beside := getattr(near, name)) is None else str(beside)
+                      for name in _SINGLE]
+            for row in road.rows.tolist():
+                limit = row[3] if math.isfinite(row[3]) else ''
+                writer.writerow((lane, *row[:3], limit, *links))
+                links = [''] * len(links)
+        write_text(text.getvalue(), path)
 
     def only(self, lane_ids: Collection[int]) -> 'WaypointRoads':
         """
@@ -240,21 +258,20 @@ def _with_predecessors(links: Mapping[int, LaneLinks]) -> dict[int, LaneLinks]:
     return {lane: replace(near, predecessors=tuple(before[lane])) for lane, near in links.items()}
 
 
-@dataclass(frozen=True)
-class LaneRows:
+class _LaneRows(NamedTuple):
     """
     One lane of a table.
 
     :param line: line number of its first row.
-    :param points: (W, 4) x [m], y [m], width [m], speed limit [m/s]
+    :param points: of each way-point x [m], y [m], width [m], speed limit [m/s]
     """
 
     line: int
-    points: FloatArray
-    links: LaneLinks = LaneLinks()
+    points: list[list[float]]
+    links: LaneLinks
 
 
-def _read_lane_rows(path: Path) -> dict[int, LaneRows]:
+def _read_lane_rows(path: Path) -> dict[int, _LaneRows]:
     """
     Read a table of way-points, lane by lane.
 
@@ -273,12 +290,10 @@ def _read_lane_rows(path: Path) -> dict[int, LaneRows]:
         raise InputError(f'is no CSV ({error})', str(path), 'save it as CSV in UTF-8') from error
 
 
-def _parse(file: TextIO, path: str) -> dict[int, LaneRows]:
+def _parse(file: TextIO, path: str) -> dict[int, _LaneRows]:
     reader = csv.reader(file, strict=True)
     columns = _header(next(reader, []), path)
-    points: dict[int, list[list[float]]] = {}
-    first: dict[int, int] = {}
-    links: dict[int, LaneLinks] = {}
+    lanes: dict[int, _LaneRows] = {}
     current = None
     for count, row in enumerate(row for row in reader if any(cell.strip() for cell in row)):
         where = f'{path}, line {reader.line_num}'
@@ -289,24 +304,24 @@ def _parse(file: TextIO, path: str) -> dict[int, LaneRows]:
                              f'give {len(columns)}, one for each column')
         cells = {name: cell.strip() for name, cell in zip(columns, row, strict=True)}
         lane = _id(cells['lane'], where)
-        if lane != current and lane in points:
+        if lane != current and lane in lanes:
             raise InputError(f'lane {lane} goes on after another lane', where,
                              'put the way-points of one lane below each other')
         current = lane
-        points.setdefault(lane, []).append([_number(cells, name, where) for name in _NUMBERS])
-        if lane not in first:
-            first[lane], links[lane] = reader.line_num, _links(cells, where)
+        numbers = [_number(cells, name, where) for name in _NUMBERS]
+        if lane not in lanes:
+            lanes[lane] = _LaneRows(reader.line_num, [], _links(cells, where))
         elif any(cells.get(name) for name in _LISTS + _SINGLE):
             raise InputError(f'links of lane {lane} stand at another row than its first', where,
                              'give them at the first way-point of the lane')
-    if not points:
+        lanes[lane].points.append(numbers)
+    if not lanes:
         raise InputError('there are no way-points', path, 'give two for each lane at least')
-    for lane, entries in points.items():
-        if len(entries) < 2:
-            raise InputError(f'lane {lane} has one way-point', f'{path}, line {first[lane]}',
+    for lane, entry in lanes.items():
+        if len(entry.points) < 2:
+            raise InputError(f'lane {lane} has one way-point', f'{path}, line {entry.line}',
                              'give two at least')
-    return {lane: LaneRows(first[lane], np.array(entries), links[lane])
-            for lane, entries in points.items()}
+    return lanes
 
 
 def _header(row: list[str], path: str) -> list[str]:
@@ -351,23 +366,3 @@ def _links(cells: Mapping[str, str], where: str) -> LaneLinks:
         tuple(_id(item, where) for item in cells.get(name, '').split()) for name in _LISTS)
     return LaneLinks(successors, predecessors, *(
         _id(text, where) if (text := cells.get(name, '')) else None for name in _SINGLE))
-
-
-def _write_lane_rows(path: Path, lanes: Mapping[int, LaneRows]) -> None:
-    """
-    Write a table of way-points that `_read_lane_rows` can read; numbers keep every bit.
-
-    :raises InputError: if the file cannot be written.
-    """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator='\n')
-    writer.writerow(('lane', *_NUMBERS, *_LISTS, *_SINGLE))
-    for lane, entry in lanes.items():
-        links = [' '.join(map(str, getattr(entry.links, name))) for name in _LISTS]
-        links += ['' if (beside := getattr(entry.links, name)) is None else str(beside)
-                  for name in _SINGLE]
-        for row in entry.points.tolist():
-            limit = row[3] if math.isfinite(row[3]) else ''
-            writer.writerow((lane, *row[:3], limit, *links))
-            links = [''] * len(links)
-    write_text(text.getvalue(), path)
