@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Way-points from lanelets' centre lines, prepared for splines, and bounds from way-points."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import math
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.waypoints.waypoints import Interpolation, WaypointLane
+from crgame_ros.waypoints.waypoints import WaypointLane
 import numpy as np
 from numpy.typing import NDArray
 import shapely
@@ -53,12 +53,6 @@ def lanelet_waypoints(network: RoadNetwork, lanelet_id: int) -> FloatArray:
     width = np.array([network.width_at(lanelet_id, s) for s in stations.tolist()])
     return np.stack((x, y, width, np.full(len(stations), np.inf if limit is None else limit)),
                     axis=-1)
-
-
-def lanelet_lane(network: RoadNetwork, lanelet_id: int,
-                 kinds: Mapping[str, Interpolation] | None = None) -> WaypointLane:
-    """Return a lane of one lanelet; see `lanelet_waypoints`."""
-    return WaypointLane.from_rows(lanelet_waypoints(network, lanelet_id), kinds)
 
 
 def lanelet_chain(network: RoadNetwork, lanelet_id: int, length: float) -> Sequence[int]:

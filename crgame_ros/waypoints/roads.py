@@ -13,7 +13,7 @@ from typing import NamedTuple, TextIO
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.waypoints.lanelets import lanelet_lane
+from crgame_ros.waypoints.lanelets import lanelet_waypoints
 from crgame_ros.waypoints.waypoints import CurveIndex, CurvePieces, Interpolation, WaypointLane
 from crgame_ros.whole_file import write_text
 import numpy as np
@@ -117,7 +117,8 @@ class WaypointRoads:
         the lanelets' own, without those to missing lanelets, and without successors and
         predecessors with a gap of more than 1 m (`MAX_GAP`).
         """
-        lanes = {lanelet: lanelet_lane(network, lanelet, kinds) for lanelet in network.lanelet_ids}
+        lanes = {lanelet: WaypointLane.from_rows(lanelet_waypoints(network, lanelet), kinds)
+                 for lanelet in network.lanelet_ids}
         return cls(lanes, {lanelet: _lanelet_links(network, lanelet, lanes) for lanelet in lanes})
 
     @classmethod

@@ -13,7 +13,7 @@ from crgame_ros.waypoints.lanelets import (
     graded,
     lane_of_chain,
     lanelet_chain,
-    lanelet_lane,
+    lanelet_waypoints,
 )
 from crgame_ros.waypoints.roads import LaneLinks, WaypointRoads
 from crgame_ros.waypoints.waypoints import WaypointLane
@@ -145,7 +145,7 @@ def test_a_chain_is_one_lane() -> None:
     here = lane.at(np.linspace(0.0, lane.length, 500))
     assert shapely.distance(shapely.points(here.x, here.y), path).max() < 0.05
     with pytest.raises(InputError, match='no lanelet 12345'):
-        lanelet_lane(network, 12345)
+        lanelet_waypoints(network, 12345)
 
 
 @pytest.mark.slow
