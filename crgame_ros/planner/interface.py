@@ -86,6 +86,3 @@ class Planner(ABC):
         :return: a plan whose stamp is the request's and whose first state is the ego's.
         :raises PlanningError: if no plan is found.
         """
-
-
-PlannerOptions = Mapping[str, object]
