@@ -67,8 +67,9 @@ class PlannerAdapter:
         self.planner = planner
         self.statistics = PlannerStatistics()
         self.last_reason: str | None = None
+        # None once it is set up.
+        self.setup_failure: str | None = 'the planner was not set up'
         self._clock = clock
-        self._setup_failure: str | None = 'the planner was not set up'
         self._last_plan: Plan | None = None
 
     def setup(self, context: PlannerContext) -> str | None:
@@ -81,20 +82,14 @@ class PlannerAdapter:
         self._vehicle = context.vehicle
         self._deceleration = firm_braking(context.vehicle)
         self._last_plan = None
-        self._setup_failure = None
-        self.last_reason = None
+        self.setup_failure = self.last_reason = None
         try:
             self._limit = RoadLimit.from_context(context)
             self.planner.setup(context)
         except Exception as error:
             self._keep_failure(error)
-            self._setup_failure = self.last_reason = f'setup failed: {describe(error)}'
-        return self._setup_failure
-
-    @property
-    def setup_failure(self) -> str | None:
-        """Return the reason why the planner is not set up; None if it is."""
-        return self._setup_failure
+            self.setup_failure = self.last_reason = f'setup failed: {describe(error)}'
+        return self.setup_failure
 
     def plan(self, request: PlanRequest) -> Plan:
         """
@@ -119,8 +114,8 @@ class PlannerAdapter:
         return plan
 
     def _ask(self, request: PlanRequest) -> tuple[Plan | None, str | None]:
-        if self._setup_failure is not None:
-            return None, self._setup_failure
+        if self.setup_failure is not None:
+            return None, self.setup_failure
         try:
             plan = self.planner.plan(request)
             if not isinstance(plan, Plan):
