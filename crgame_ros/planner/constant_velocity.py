@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 from crgame_ros.geometry.polyline import ReferencePath
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.interface import PlannerContext
-from crgame_ros.planner.path_following import PathFollower
+from crgame_ros.planner.path_following import covering_steps, PathFollower
 from crgame_ros.planner.path_planner import check_positive, PathPlanner
 from crgame_ros.planner.reference_path import DrivingPath
 from crgame_ros.vehicle.parameters import VehicleParameters
@@ -41,7 +41,7 @@ class ConstantVelocityPlanner(PathPlanner):
 
     def plan(self, request: PlanRequest) -> Plan:
         """Plan at constant speed over the horizon."""
-        steps = math.ceil(self._horizon / request.time_step_s - 1e-9)
+        steps = covering_steps(self._horizon, request.time_step_s)
         if self._straight:
             ego = request.ego
             ahead = np.array([[0.0], [abs(ego.speed) * self._horizon + 10.0]])

@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.interface import PlannerContext
-from crgame_ros.planner.path_following import Longitudinal, PathPosition
+from crgame_ros.planner.path_following import covering_steps, Longitudinal, PathPosition
 from crgame_ros.planner.path_obstacles import Corridor, ObstacleProjector, PathObstacles
 from crgame_ros.planner.path_planner import check_positive, PathPlanner
 from crgame_ros.planner.reference_path import (
@@ -250,7 +250,7 @@ class IdmPlanner(PathPlanner):
     def plan(self, request: PlanRequest) -> Plan:
         """Plan over the horizon; see the class."""
         position = self.follow(request)
-        steps = math.ceil(self._horizon / request.time_step_s - 1e-9)
+        steps = covering_steps(self._horizon, request.time_step_s)
         obstacles = self._obstacles(request, position, steps)
         leaders = _leaders(obstacles, request, position.s, self._context.vehicle)
         states = self.follower.drive(
@@ -269,7 +269,7 @@ class IdmPlanner(PathPlanner):
         :return: (S) [m/s]
         """
         position = self.locate(request)
-        steps = math.ceil(self._horizon / request.time_step_s - 1e-9)
+        steps = covering_steps(self._horizon, request.time_step_s)
         leaders: list[Leader] = []
         if not alone:
             place = position._replace(d=lane.offset) if there else position

@@ -24,7 +24,6 @@ leader is chosen for the whole horizon; traffic lights are ignored.
 """
 
 import logging
-import math
 from typing import ClassVar
 
 from commonroad.common.util import Interval
@@ -39,7 +38,7 @@ from commonroad.scenario.state import CustomState, InitialState, KSState
 from commonroad.scenario.trajectory import Trajectory
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.messages.plan import Plan, PlanRequest
-from crgame_ros.planner.path_following import PathPosition
+from crgame_ros.planner.path_following import covering_steps, PathPosition
 from crgame_ros.planner.path_obstacles import Corridor, ObstacleProjector, prolong
 from crgame_ros.planner.path_planner import check_positive, PathPlanner
 from crgame_ros.planner.reference_path import (
@@ -119,7 +118,7 @@ class IdmPackagePlanner(PathPlanner):
         """
         position = self.locate(request)
         dt_s = request.time_step_s
-        steps = math.ceil(self._horizon / dt_s - 1e-9)
+        steps = covering_steps(self._horizon, dt_s)
         self._enter_window(position.s)
         scenario = self._scenario(request, position, steps)
         self._planner._scenario = scenario

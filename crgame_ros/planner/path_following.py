@@ -38,6 +38,11 @@ CORRECTION_TIME = 2.5
 REST_STEPS = 10
 
 
+def covering_steps(time_s: float, dt_s: float) -> int:
+    """Return how many steps cover a time; one that a rounding error adds is left out."""
+    return math.ceil(time_s / dt_s - 1e-9)
+
+
 class PathPosition(NamedTuple):
     """Arc length s [m], offset d to the left [m] and heading error [rad] against a path."""
 

@@ -103,9 +103,9 @@ class ReactivePlanner(Planner):
         """Plan the path and build the package's planner."""
         self._context = context
         self._idm.setup(context)
-        steps = self._steps = max(10, math.ceil(self._horizon / context.time_step_s - 1e-9))
-        self._span_s = steps * context.time_step_s
-        config = configuration(context, steps)
+        config = configuration(context, self._horizon)
+        self._steps: int = config.planning.time_steps_computation
+        self._span_s = self._steps * context.time_step_s
         config.sampling.num_sampling_levels = LEVELS
         self._clearance = Clearance(context, self._distance)
         self._core = ReactiveCore(context, config, self._margin, self._clearance)

@@ -14,7 +14,7 @@ from crgame_ros.geometry.reference_point import joined, shifted
 from crgame_ros.messages.plan import PlanRequest
 from crgame_ros.planner.collision_slices import CollisionSlices
 from crgame_ros.planner.interface import PlannerContext
-from crgame_ros.planner.path_following import PathPosition
+from crgame_ros.planner.path_following import covering_steps, PathPosition
 from crgame_ros.planner.path_obstacles import Clearance
 from crgame_ros.planner.reference_path import DrivingPath
 from crgame_ros.planner.sample_kinematics import feasible, place
@@ -51,15 +51,16 @@ def frame_rows(path: ReferencePath, s: float) -> slice:
     return slice(rows.start, rows.start + max(int(outside[0]), 4)) if len(outside) else rows
 
 
-def configuration(context: PlannerContext, steps: int) -> ReactivePlannerConfiguration:
+def configuration(context: PlannerContext, horizon_s: float) -> ReactivePlannerConfiguration:
     """
     Return the package's default configuration, with the vehicle, the grid and the horizon set.
 
-    :param steps: length of a plan in scenario steps.
+    :param horizon_s: length of a plan, of ten scenario steps at least [s]
     """
     config = ReactivePlannerConfiguration()
     config.planning.dt = context.time_step_s
-    config.planning.time_steps_computation = steps
+    config.planning.time_steps_computation = max(
+        10, covering_steps(horizon_s, context.time_step_s))
     # The package refuses to sample times below two steps.
     config.sampling.t_min = max(config.sampling.t_min, 2.0 * context.time_step_s)
     # The package's processes wait for ever when one of them fails.

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The sampling-based planner commonroad-reactive-planner 2025.1 as its authors ship it."""
 
-import math
 from typing import ClassVar
 
 from crgame_ros.errors import InputError, PlanningError
@@ -44,8 +43,7 @@ class ReactivePackagePlanner(PathPlanner):
     def setup(self, context: PlannerContext) -> None:
         """Plan the path and build the package's planner."""
         super().setup(context)
-        steps = max(10, math.ceil(self._horizon / context.time_step_s - 1e-9))
-        config = configuration(context, steps)
+        config = configuration(context, self._horizon)
         config.sampling.num_sampling_levels = self._levels
         self._core = ReactiveCore(context, config, margin=0.0)
         self._desired = self._v0

@@ -11,6 +11,7 @@ from typing import Literal, NamedTuple, TypeAlias
 from crgame_ros.geometry.polyline import ReferencePath
 from crgame_ros.messages.plan import PlanRequest
 from crgame_ros.planner.interface import PlannerContext
+from crgame_ros.planner.path_following import covering_steps
 from crgame_ros.planner.path_obstacles import Corridor, ObstacleProjector
 from crgame_ros.planner.reference_path import CHANGE_MIN, DrivingPath, plan_driving_path
 from crgame_ros.roads.network import RoadNetwork
@@ -152,7 +153,7 @@ def has_gap(projector: ObstacleProjector, path: ReferencePath, request: PlanRequ
     rear, front = vehicle.rear, vehicle.front
     corridor = Corridor(s, offset, 1.0, AHEAD, 0.5 * vehicle.width + SIDE_MARGIN, front,
                         offset, BEHIND)
-    steps = 1 + math.ceil(LOOK_AHEAD_S / request.time_step_s - 1e-9)
+    steps = 1 + covering_steps(LOOK_AHEAD_S, request.time_step_s)
     others = projector.project(path, corridor, request, steps)
     for column in range(len(others.ids)):
         at = int(np.argmax(others.blocking[:, column]))

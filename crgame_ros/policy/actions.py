@@ -8,7 +8,7 @@ from typing import get_args, Literal, NamedTuple
 
 from crgame_ros.errors import PlanningError
 from crgame_ros.geometry.angles import wrap_pi_array
-from crgame_ros.planner.path_following import Rollout
+from crgame_ros.planner.path_following import covering_steps, Rollout
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
 from crgame_ros.vehicle.parameters import VehicleParameters
@@ -112,6 +112,11 @@ def pedals(action: Array) -> DriverCommand:
     return DriverCommand(max(pedal, 0.0), max(-pedal, 0.0), steering)
 
 
+def held_steps(dt_s: float) -> int:
+    """Return the steps of a plan that holds an action, one at least."""
+    return max(1, covering_steps(HELD_S, dt_s))
+
+
 def planned_states(kind: ActionKind, action: Array, ego: VehicleState,
                    vehicle: VehicleParameters, dt_s: float, substeps: int) -> Array:
     """
@@ -125,7 +130,7 @@ def planned_states(kind: ActionKind, action: Array, ego: VehicleState,
     """
     if kind == 'plan':
         return _stated(action, ego, vehicle, dt_s)
-    steps = max(1, math.ceil(HELD_S / dt_s - 1e-9))
+    steps = held_steps(dt_s)
     if kind == 'pedals':
         return _driven(pedals(action), ego, vehicle, steps, dt_s, substeps)
     wanted = wanted_motion(action, ego.speed, vehicle)

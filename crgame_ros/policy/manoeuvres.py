@@ -14,7 +14,7 @@ from crgame_ros.planner.reference_path import (
     plan_driving_path,
 )
 from crgame_ros.planner.side_lanes import side_lanes
-from crgame_ros.policy.actions import BRAKING, DRIVING, HELD_S, MANOEUVRES
+from crgame_ros.policy.actions import BRAKING, DRIVING, held_steps, MANOEUVRES
 from crgame_ros.policy.route_guide import RESERVE
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
@@ -106,8 +106,8 @@ class Manoeuvres:
                 return min(BRAKING, -speed / dt_s)
             return min(max((wanted - speed) / APPROACH_S, -BRAKING), DRIVING)
 
-        return self._follower.drive(state, self._locate(state),
-                                    max(1, math.ceil(HELD_S / dt_s - 1e-9)), dt_s, acceleration)
+        return self._follower.drive(state, self._locate(state), held_steps(dt_s), dt_s,
+                                    acceleration)
 
     def _enter(self, start: VehicleState) -> None:
         """Take the lane of a state."""
