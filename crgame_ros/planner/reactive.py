@@ -144,20 +144,22 @@ class ReactivePlanner(Planner):
 
     def _aims(self, request: PlanRequest, position: PathPosition) -> Iterator[_Aim]:
         """Yield the lanes that may be driven in, the best first."""
-        sides = side_lanes(self._driving, self._search_s(request, position), self._context.vehicle)
-        nearest = min((OWN_LANE, *sides), key=lambda lane: abs(lane.offset - position.d))
+        lanes, nearest = self._lanes_ahead(request, position)
         free = float(self._idm.speeds(request, alone=True)[-1])
         own = self._aim(request, position, OWN_LANE, nearest, free)
         if own is not None and own.loss < LEAVING:
             # No other lane can be better, so the others are judged only if this one fails.
             yield own
             own = None
-        aims = [own, *(self._aim(request, position, lane, nearest, free) for lane in sides)]
+        aims = [own, *(self._aim(request, position, lane, nearest, free) for lane in lanes[1:])]
         yield from sorted(aim for aim in aims if aim is not None)
 
-    def _search_s(self, request: PlanRequest, position: PathPosition) -> float:
-        """Return the arc length at which side lanes are searched [m]."""
-        return position.s + max(SHORTEST_LOOK, max(request.ego.speed, 0.0) * self._span_s)
+    def _lanes_ahead(self, request: PlanRequest,
+                     position: PathPosition) -> tuple[list[SideLane], SideLane]:
+        """Return the own lane and those beside it, ahead, and the nearest of them."""
+        ahead = max(SHORTEST_LOOK, max(request.ego.speed, 0.0) * self._span_s)
+        lanes = [OWN_LANE, *side_lanes(self._driving, position.s + ahead, self._context.vehicle)]
+        return lanes, min(lanes, key=lambda lane: abs(lane.offset - position.d))
 
     def _aim(self, request: PlanRequest, position: PathPosition, lane: SideLane,
              nearest: SideLane, free: float) -> _Aim | None:
@@ -242,18 +244,17 @@ class ReactivePlanner(Planner):
         These are the lane that the ego is in, and lanes without a vehicle beside the ego in which
         the vehicle behind keeps the gap that a lane change requires.
         """
-        sides = side_lanes(self._driving, self._search_s(request, position), self._context.vehicle)
-        nearest = min((OWN_LANE, *sides), key=lambda lane: abs(lane.offset - position.d))
-        free = {lane for lane in (OWN_LANE, *sides)
+        lanes, nearest = self._lanes_ahead(request, position)
+        free = {lane for lane in lanes
                 if lane is nearest or self._idm.has_gap(request, lane, ahead_too=False)}
         speed = request.ego.speed
-        own, lanes = (self._within(bounds, position.s, speed)
-                      for bounds in (self._lane, self._lanes))
+        own, all_lanes = (self._within(bounds, position.s, speed)
+                          for bounds in (self._lane, self._lanes))
         right, left = (any(lane.offset * side > 0.0 for lane in free) for side in (-1.0, 1.0))
         offsets = {nearest.offset}
         offsets |= set(own) if OWN_LANE in free else set()
-        offsets |= {lanes[0]} if right else set()
-        offsets |= {lanes[1]} if left else set()
+        offsets |= {all_lanes[0]} if right else set()
+        offsets |= {all_lanes[1]} if left else set()
         return offsets
 
     def _sample(self, level: int, aim: _Aim, times: set[float], speeds: set[float],
