@@ -375,9 +375,7 @@ def sample(space: VariantSpace, sampling: Sampling, number: int, seed: int,
     """
     if sampling == 'grid':
         levels = [axis.levels for axis in space.axes]
-        size = 1
-        for each in levels:
-            size *= len(each)
+        size = math.prod(map(len, levels))
         if size > MOST_VARIANTS:
             raise InputError(f'its grid has {size} variants', where, 'give fewer levels')
         grid = (dict(zip(space.names, values, strict=True)) for values in product(*levels))
@@ -409,7 +407,4 @@ def _points(sampling: Sampling, dimensions: int, seed: int) -> Callable[[int], P
         rng = np.random.default_rng(seed)
         return lambda number: rng.random((number, dimensions))
     engine = {'sobol': qmc.Sobol, 'lhs': qmc.LatinHypercube}[sampling](dimensions, rng=seed)
-
-    def draw(number: int) -> Points:
-        return engine.random(number)
-    return draw
+    return engine.random
