@@ -3,7 +3,7 @@
 """The tables of an evaluation on disk: complete parts, and a journal of newer rows."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 import fcntl
 from functools import partial
 import json
@@ -15,7 +15,7 @@ from typing import IO, Self
 
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.analysis.tables.writer import TableWriter
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, refusing
 from crgame_ros.evaluation.results.cell_rows import (
     CellRows,
     CELLS,
@@ -76,16 +76,15 @@ class ResultParts:
 
     def __init__(self, folder: Path, part_cells: int = PART_CELLS) -> None:
         self.folder, self._part_cells = folder, part_cells
-        try:
+        with self._refusing():
             for table in TABLES_OF_CELLS:
                 (folder / table.name).mkdir(parents=True, exist_ok=True)
             self._lock = (folder / LOCK).open('w')
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise InputError('another evaluation writes there', str(folder),
-                             'wait for it, or name another folder') from error
-        except OSError as error:
-            raise _refusal(folder, error) from error
+            try:
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise InputError('another evaluation writes there', str(folder),
+                                 'wait for it, or name another folder') from error
         self._rows: list[CellRows] = []
         self._journal: IO[str] | None = None
         self._synced_s = 0.0
@@ -106,7 +105,7 @@ class ResultParts:
         :param cells: `cell`, `vehicles`, `work` of each, with all columns of the tables.
         :raises InputError: if they cannot be written.
         """
-        try:
+        with self._refusing():
             assert self._journal is not None
             self._journal.write(_lines(cells))
             self._journal.flush()
@@ -116,14 +115,13 @@ class ResultParts:
             self._rows += cells
             if len(self._rows) >= self._part_cells:
                 self.finish_part()
-        except OSError as error:
-            raise _refusal(self.folder, error) from error
 
     def finish_part(self) -> None:
         """Write the rows that are only in the journal as a part."""
         if not self._rows:
             return
-        _write_part(self.folder, self._number, self._rows)
+        _replace_part(self.folder, part_name(self._number),
+                      lambda table, path: _write_rows(table, self._rows, path))
         self._rows = []
         self._start_journal(self._number + 1)
 
@@ -147,7 +145,7 @@ class ResultParts:
     def keys(self) -> Iterator[str]:
         """Yield the keys of all stored cells."""
         for path in part_paths(self.folder / CELLS.name):
-            yield from _column(path, 'cell')
+            yield from _read(path, ['cell'])['cell'].to_pylist()
         for rows in self._rows:
             yield str(rows['cell']['cell'])
 
@@ -175,6 +173,10 @@ class ResultParts:
         self._start_journal(_next_number(self.folder))
         return away
 
+    def _refusing(self) -> AbstractContextManager[None]:
+        return refusing('cannot be written', self.folder,
+                        'choose a folder that can be written, on a disk with room')
+
     def _start_journal(self, number: int) -> None:
         """Start the journal of a part, and remove an empty one of another part."""
         if self._journal is not None:
@@ -194,17 +196,13 @@ class ResultParts:
                 path.unlink()
                 continue
             self._rows += _journal_lines(path)
-            _write_lines(path, self._rows)
+            write_whole(_lines(self._rows).encode(), path)
         return number
 
 
 def _lines(cells: Iterable[Mapping[str, object]]) -> str:
     """Return the rows of cells as lines of a journal."""
     return ''.join(json.dumps(rows) + '\n' for rows in cells)
-
-
-def _write_lines(path: Path, cells: Iterable[Mapping[str, object]]) -> None:
-    write_whole(_lines(cells).encode(), path)
 
 
 def _part_names(folder: Path) -> list[str]:
@@ -321,13 +319,6 @@ def _rows_of(table: TableDeclaration, cell: CellRows) -> list[dict[str, object]]
     return [cell['cell'] if table is CELLS else cell['work']]
 
 
-def _write_part(folder: Path, number: int, cells: Sequence[CellRows]) -> None:
-    """Write rows as a part of every table."""
-    def write(table: TableDeclaration, path: Path) -> None:
-        _write_rows(table, cells, path)
-    _replace_part(folder, part_name(number), write)
-
-
 def _replace_part(folder: Path, name: str,
                   write: Callable[[TableDeclaration, Path], object]) -> None:
     """Write a part of every table, completely or not at all; that of `cells` is last."""
@@ -363,10 +354,6 @@ def _write_filtered(source: Path, name: str, keys: set[str], inside: bool,
         compression='zstd')
 
 
-def _column(path: Path, name: str) -> list[str]:
-    return _read(path, [name])[name].to_pylist()
-
-
 def _read(path: Path, columns: list[str] | None = None) -> pa.Table:
     """
     Read a part of a table.
@@ -390,8 +377,3 @@ def _refused(path: Path) -> Iterator[None]:
         raise InputError(f'is damaged ({reason})', str(path), 'remove '
                          f'{path.parent.parent / CELLS.name / path.name}, and the same command '
                          'computes its cells again') from error
-
-
-def _refusal(folder: Path, error: OSError) -> InputError:
-    return InputError(f'cannot be written ({error.strerror})', str(folder),
-                      'choose a folder that can be written, on a disk with room')
