@@ -23,7 +23,7 @@ _COLUMNS = frozenset(column.name for column in VEHICLES_OF_CELLS.columns
 # Measures of a single run that are neither a column nor a measure of summaries.
 GOAL_REACHED_S = 'goal_reached_s'
 # The measures of summaries that a vehicle has; that of cells concerns all of them.
-_SUMMARY = frozenset(name for name, measure in MEASURES.items() if measure.column)
+_SUMMARY = {name: measure for name, measure in MEASURES.items() if measure.column}
 # Criticality measures may be named without what makes them one value.
 _WORST = 'worst_'
 KNOWN = frozenset({GOAL_REACHED_S, *_SUMMARY, *_COLUMNS})
@@ -88,8 +88,8 @@ def value_of(measure: str, row: Row) -> float | None:
     if measure == GOAL_REACHED_S:
         # Never reached is later than any time.
         return math.inf if math.isnan(values[0]) else values[0]
-    summary = MEASURES.get(_full_name(measure))
-    value = values[0] if summary is None or not summary.column else float(
+    summary = _SUMMARY.get(_full_name(measure))
+    value = values[0] if summary is None else float(
         summary.values(*map(np.atleast_1d, values))[0])
     return None if math.isnan(value) else value
 
@@ -99,8 +99,7 @@ def columns_of(measure: str) -> tuple[str, ...]:
     if measure == GOAL_REACHED_S:
         return ('score_reached_s',)
     name = _full_name(measure)
-    summary = MEASURES.get(name)
-    return (name,) if summary is None or not summary.column else summary.columns
+    return _SUMMARY[name].columns if name in _SUMMARY else (name,)
 
 
 def worst_of(measure: str, rows: Sequence[Row], sign: int) -> float | None:
