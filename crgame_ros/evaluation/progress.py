@@ -5,7 +5,6 @@
 from collections.abc import Callable
 import sys
 import time
-from typing import TextIO
 
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.evaluation import EvaluationTally
@@ -17,22 +16,39 @@ PERIOD_S, BAR_PERIOD_S = 10.0, 0.2
 TOLD_FAILURES = 20
 
 
-class EvaluationProgress:
+class ProgressDisplay:
     """
-    The display of an evaluation's progress.
+    A line of progress on stderr, which is written over on a terminal, and other lines between.
 
-    :param stream: stream to write to; stderr by default.
     :param clock: returns the time [s].
     """
 
-    def __init__(self, stream: TextIO | None = None,
-                 clock: Callable[[], float] = time.monotonic) -> None:
-        # Not as a default argument: what stderr is may change after the import.
-        self._stream, self._clock = stream or sys.stderr, clock
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._stream, self._clock = sys.stderr, clock
         self._bar = self._stream.isatty()
         self._begin_s: float | None = None
-        self._told_s = 0.0
-        self._failures = 0
+        self._told_s = clock()
+
+    def _is_due(self, now_s: float) -> bool:
+        """Return whether the line was written long enough ago."""
+        return now_s - self._told_s >= (BAR_PERIOD_S if self._bar else PERIOD_S)
+
+    def _print(self, text: str) -> None:
+        clear = '\r\033[K' if self._bar else ''
+        print(f'{clear}{text}', file=self._stream, flush=True)
+
+    def _write(self, text: str, last: bool) -> None:
+        """Write the line of progress."""
+        if self._bar:
+            print(f'\r\033[K{text}', end='\n' if last else '', file=self._stream, flush=True)
+        else:
+            print(text, file=self._stream, flush=True)
+
+
+class EvaluationProgress(ProgressDisplay):
+    """The display of an evaluation's progress."""
+
+    _failures = 0
 
     def __call__(self, tally: EvaluationTally, cell: Cell | None,
                  row: dict[str, object] | None) -> None:
@@ -49,7 +65,7 @@ class EvaluationProgress:
         if cell is not None and row is not None and row['status'] != 'ok':
             self._fail(cell, row)
         last = tally.before + tally.done == tally.total
-        if last or now_s - self._told_s >= (BAR_PERIOD_S if self._bar else PERIOD_S):
+        if last or self._is_due(now_s):
             self._told_s = now_s
             self._write(_line(tally, now_s - self._begin_s, self._bar), last)
 
@@ -59,16 +75,6 @@ class EvaluationProgress:
             self._print(f'{row["status"]}: {cell.label} ({cell.key[:8]}): {row["reason"]}')
         elif self._failures == TOLD_FAILURES + 1:
             self._print('further failures are in the tables only')
-
-    def _print(self, text: str) -> None:
-        clear = '\r\033[K' if self._bar else ''
-        print(f'{clear}{text}', file=self._stream, flush=True)
-
-    def _write(self, text: str, last: bool) -> None:
-        if self._bar:
-            print(f'\r\033[K{text}', end='\n' if last else '', file=self._stream, flush=True)
-        else:
-            print(text, file=self._stream, flush=True)
 
 
 def _line(tally: EvaluationTally, passed_s: float, bar: bool) -> str:

@@ -2,12 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shows the progress of a search: its parts, and how long the rest takes."""
 
-from collections.abc import Callable
-import sys
-import time
-from typing import TextIO
-
-from crgame_ros.evaluation.progress import BAR_PERIOD_S, duration_text, PERIOD_S
+from crgame_ros.evaluation.progress import duration_text, ProgressDisplay
 from crgame_ros.search.trials import Outcome
 
 # The time that a search takes is stated after so many runs; to choose variants takes longer, the
@@ -15,22 +10,17 @@ from crgame_ros.search.trials import Outcome
 _STATED_AFTER, _MORE = 24, 1.25
 
 
-class SearchProgress:
+class SearchProgress(ProgressDisplay):
     """
     The display of a search's progress.
 
     :param budget: number of runs.
-    :param stream: stream to write to; stderr by default.
-    :param clock: returns the time [s].
     """
 
-    def __init__(self, budget: int, stream: TextIO | None = None,
-                 clock: Callable[[], float] = time.monotonic) -> None:
-        self._budget, self._stream, self._clock = budget, stream or sys.stderr, clock
-        self._bar = self._stream.isatty()
+    def __init__(self, budget: int) -> None:
+        super().__init__()
+        self._budget = budget
         self._done = self._new = self._failures = self._excused = self._unknown = 0
-        self._begin_s: float | None = None
-        self._told_s = clock()
         self._stated = False
 
     def began(self, part: str, runs: int) -> None:
@@ -55,13 +45,13 @@ class SearchProgress:
             self._stated = True
             stated = duration_text(_MORE * self._left_s(now_s))
             self._print(f'{self._budget} runs: about {stated} to go')
-        if now_s - self._told_s >= (BAR_PERIOD_S if self._bar else PERIOD_S):
+        if self._is_due(now_s):
             self._told_s = now_s
-            self._write(self._line(now_s), end='')
+            self._write(self._line(now_s), last=False)
 
     def close(self) -> None:
         """Write the last line."""
-        self._write(self._line(self._clock()), end='\n')
+        self._write(self._line(self._clock()), last=True)
 
     def _left_s(self, now_s: float) -> float:
         passed_s = now_s - (now_s if self._begin_s is None else self._begin_s)
@@ -73,13 +63,3 @@ class SearchProgress:
         excused = f', {self._excused} more not to blame' if self._excused else ''
         return (f'{self._done} of {self._budget} runs, {self._failures} failures{excused}'
                 f'{left}')
-
-    def _print(self, text: str) -> None:
-        clear = '\r\033[K' if self._bar else ''
-        print(f'{clear}{text}', file=self._stream, flush=True)
-
-    def _write(self, text: str, end: str) -> None:
-        if self._bar:
-            print(f'\r\033[K{text}', end=end, file=self._stream, flush=True)
-        else:
-            print(text, file=self._stream, flush=True)
