@@ -108,24 +108,24 @@ def told(outcome: Outcome) -> str:
     return outcome.excused or '; '.join(outcome.broken) or outcome.reason
 
 
-def document(result: SearchResult, found: Sequence[str]) -> dict[str, object]:
+def results_text(result: SearchResult, found: Sequence[str]) -> str:
     """
-    Return what was found as JSON-compatible values.
+    Return what was found as JSON.
 
     :param found: the same in words, as `lines` yields it.
     """
-    space = result.space
-    return {
+    return json.dumps({
         'game': result.settings.game, 'planner': result.settings.planner or 'own',
-        'goals': [{'measure': goal.measure, 'sign': goal.sign} for goal in result.settings.goals],
+        'goals': [asdict(goal) for goal in result.settings.goals],
         'expectations': [each.told() for each in result.expectations],
-        'lines': list(found), 'nominal': space.nominal,
+        'lines': list(found), 'nominal': result.space.nominal,
         'outcomes': [{
             'cell': outcome.key, 'variant': dict(outcome.variant),
             'values': list(outcome.values), 'verdict': verdict(outcome), 'told': told(outcome)}
             for outcome in result.outcomes],
         'probability': None if result.probability is None else asdict(result.probability),
-        'smallest': None if result.smallest is None else result.smallest.key}
+        'smallest': None if result.smallest is None else result.smallest.key},
+        ensure_ascii=False, allow_nan=False) + '\n'
 
 
 def boundary_slices(result: SearchResult) -> Iterator[dict[str, object]]:
@@ -143,8 +143,3 @@ def boundary_slices(result: SearchResult) -> Iterator[dict[str, object]]:
             found = result.boundary.probabilities(variants).reshape(_GRID, _GRID, len(others))
             yield {'x': x.name, 'y': y.name,
                    'probabilities': found.mean(axis=2).round(3).tolist()}
-
-
-def results_text(result: SearchResult, found: Sequence[str]) -> str:
-    """Return what `document` holds as JSON."""
-    return json.dumps(document(result, found), ensure_ascii=False, allow_nan=False) + '\n'
