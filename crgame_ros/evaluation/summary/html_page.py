@@ -118,25 +118,16 @@ def write_summary_page(summary: Summary, path: Path) -> None:
     :param path: path of the file; links to the cells' reports are relative to it.
     :raises InputError: if it cannot be written.
     """
-    write_text(summary_html(summary, path.parent), path)
-
-
-def summary_html(summary: Summary, folder: Path) -> str:
-    """
-    Return the page.
-
-    :param folder: folder in which it will be.
-    """
-    sections = [Section(each.key, plain(each.title), _section(summary, each, folder))
+    sections = [Section(each.key, plain(each.title), _section(summary, each, path.parent))
                 for each in summary_tables(summary)]
     sections.append(Section('measures', 'Measures', _definitions(summary)))
     facts = [('cells finished', str(summary.cells)), ('failed', str(summary.failed)),
              ('scenarios', str(summary.scenarios)),
              (f'groups by {" × ".join(summary.by)}', str(len(summary.groups))),
              ('baseline', free(summary.baseline or '–'))]
-    return Page(summary_title(summary), free(summary_lead(summary)), facts, [Article(sections)],
-                f'<p>crgame_ros {plain(__version__)}</p>',
-                _STYLE.read_text(encoding='utf-8')).html()
+    page = Page(summary_title(summary), free(summary_lead(summary)), facts, [Article(sections)],
+                f'<p>crgame_ros {plain(__version__)}</p>', _STYLE.read_text(encoding='utf-8'))
+    write_text(page.html(), path)
 
 
 def _section(summary: Summary, content: SummaryTable, folder: Path) -> str:
