@@ -184,8 +184,9 @@ class AgentGame:
 
     def observed(self, number: int) -> Observed:
         """Return an agent's observation, by part, once for each decision."""
-        seen = self.observe(number, [self.seats[number]])
-        return self.completed(number, {part: values[0] for part, values in seen.items()})
+        seat = self.seats[number]
+        return self.completed(number, self._observations[number].observe_one(
+            seat.around, seat.place, seat.guide))
 
     def observe(self, number: int, seats: Sequence[AgentSeat]) -> Observed:
         """

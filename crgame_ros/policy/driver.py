@@ -97,10 +97,9 @@ class PolicyDriver(DriverSource):
         place = self._guide.follow(state)
         if self._action is not None and (n // self._seat.steps_per_tick) % self._policy.ticks:
             return
-        seen = self._observation.observe([self._view.observe(vehicle_states, objects)], [place],
-                                         [self._guide])
-        self._attempt(lambda: self._decide(self._history.add(
-            {part: values[0] for part, values in seen.items()})))
+        seen = self._observation.observe_one(self._view.observe(vehicle_states, objects), place,
+                                             self._guide)
+        self._attempt(lambda: self._decide(self._history.add(seen)))
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
         """Return the command of the present action, or that of a lost driver."""

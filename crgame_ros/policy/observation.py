@@ -93,6 +93,11 @@ class Observation:
             made[part] = np.minimum(np.maximum(values.astype(np.float32), low), high)
         return made
 
+    def observe_one(self, around: Surrounded, place: RoutePlace, guide: RouteGuide) -> Observed:
+        """Return the observation of one vehicle, by part."""
+        seen = self.observe([around], [place], [guide])
+        return {part: values[0] for part, values in seen.items()}
+
     def _route(self, own: Array, places: Sequence[RoutePlace],
                guides: Sequence[RouteGuide]) -> Array:
         points = np.stack([guide.driving.path.pose_at(place.s + self._ahead)

@@ -57,10 +57,8 @@ class PolicyPlanner(Planner):
         """Plan a new action, or the held one, from the vehicle's present state."""
         decided, place = self._decided_k, self._guide.follow(request.ego)
         if decided is None or not 0 < request.k - decided < self._policy.ticks:
-            seen = self._observation.observe([self._view.observe(request)], [place],
-                                             [self._guide])
-            self._decide(request.ego, self._history.add(
-                {part: values[0] for part, values in seen.items()}))
+            seen = self._observation.observe_one(self._view.observe(request), place, self._guide)
+            self._decide(request.ego, self._history.add(seen))
             # After it, so that a policy that fails is asked again and its last action not held.
             self._decided_k = request.k
         if self._manoeuvres is not None:
