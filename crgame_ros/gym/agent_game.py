@@ -13,7 +13,7 @@ from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.errors import InputError, PlanningError
 from crgame_ros.game.game import Game
 from crgame_ros.gym.driving_game import AgentSeat, DrivingGame
-from crgame_ros.gym.episode_options import EpisodeOptions, read_options, Start
+from crgame_ros.gym.episode_options import EpisodeOptions, read_options
 from crgame_ros.gym.episode_setups import EpisodeSetups, StartVariation
 from crgame_ros.gym.reward import Decision, Reward, USUAL_REWARD
 from crgame_ros.gym.scene_painter import ScenePainter
@@ -165,11 +165,6 @@ class AgentGame:
         """Return the agents' seats."""
         return self.game.seats
 
-    def setup(self, seed: int, start: Start | None, difficulty: float) -> Setup:
-        """Return the setup of an episode (`EpisodeSetups.make`)."""
-        return self.setups.make(seed, {seat.id: seat.guide for seat in self.seats}, start,
-                                difficulty)
-
     def begin(self, setup: Setup) -> None:
         """Begin an episode."""
         if self.experiment.reward.is_measured:
@@ -271,8 +266,9 @@ class Episodes:
             difficulty = self.experiment.difficulty
         scene = options.scene or scenes.pick(seed)
         self.agent = self._game(self.experiment.setups.of(scene, difficulty, seed), scene)
-        self.agent.begin(self.agent.setup(
-            seed, options.start, 1.0 if difficulty is None else difficulty))
+        guides = {seat.id: seat.guide for seat in self.agent.seats}
+        self.agent.begin(self.agent.setups.make(
+            seed, guides, options.start, 1.0 if difficulty is None else difficulty))
         return self.agent
 
     def _make_game(self, setups: EpisodeSetups, scene: str) -> AgentGame:
