@@ -82,7 +82,11 @@ def convert_map(source: Path, kind: WorldKind, timeout_s: float,
     """
     with tempfile.TemporaryDirectory(prefix='crgame-import-') as name:
         folder = Path(name)
-        root, cycles, remarks = _prepared(source, kind, folder, timeout_s, say)
+        try:
+            root, cycles, remarks = _prepared(source, kind, folder, timeout_s, say)
+        except ValueError as error:
+            raise InputError(f'has a value that is no number ({error})', str(source),
+                             'look at the map in an editor of its format') from error
         given, made = folder / 'given.xml', folder / 'made.xml'
         given.write_bytes(etree.tostring(root, xml_declaration=True, encoding='UTF-8'))
         program = DESIGNER.program('crdesigner', say)
@@ -100,17 +104,11 @@ def convert_map(source: Path, kind: WorldKind, timeout_s: float,
 def _prepared(source: Path, kind: WorldKind, folder: Path, timeout_s: float,
               say: Callable[[str], object],
               ) -> tuple[etree._Element, list[LightCycle | None] | None, list[str]]:
-    """Return the map as the converter reads it, the cycles of its lights, and remarks."""
-    try:
-        return _made_ready(source, kind, folder, timeout_s, say)
-    except ValueError as error:
-        raise InputError(f'has a value that is no number ({error})', str(source),
-                         'look at the map in an editor of its format') from error
+    """
+    Return the map as the converter reads it, the cycles of its lights, and remarks.
 
-
-def _made_ready(source: Path, kind: WorldKind, folder: Path, timeout_s: float,
-                say: Callable[[str], object],
-                ) -> tuple[etree._Element, list[LightCycle | None] | None, list[str]]:
+    :raises ValueError: if a value of the map is no number.
+    """
     if kind is LANELET2:
         root = _parsed(source, 'osm')
         return root, None, prepare_lanelet2(root, str(source))
