@@ -7,6 +7,7 @@ from copy import deepcopy
 import math
 
 from commonroad.scenario.traffic_sign import TrafficSignIDCountries
+from crgame_ros.geometry.curve import arc_length
 from crgame_ros.scenario.export_ids import IdPool, ids_of
 from crgame_ros.worlds.opendrive import LightCycle
 from lxml import etree
@@ -139,7 +140,7 @@ class Bounds:
 
         :param numbers: ids of the parts.
         """
-        along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(self.center, axis=0).T))))
+        along = arc_length(self.center)
         ends = np.interp(np.linspace(0.0, along[-1], parts + 1), along, np.arange(len(along)))
         made = []
         for start, end, number in zip(ends[:-1], ends[1:], numbers, strict=True):
@@ -352,9 +353,7 @@ def _set_cycles(root: etree._Element, cycles: Sequence[LightCycle | None] | None
         cycles = None
     off = 0
     for light, cycle in zip(lights, cycles or [None] * len(lights), strict=True):
-        for old in light.findall('cycle'):
-            light.remove(old)
-        for old in light.findall('active'):
+        for old in light.findall('cycle') + light.findall('active'):
             light.remove(old)
         made = etree.Element('cycle')
         off += cycle is None
