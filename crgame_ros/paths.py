@@ -120,6 +120,13 @@ def scenarios_directory() -> Path:
     return share_directory() / 'scenarios'
 
 
+def own_games() -> dict[str, Path]:
+    """Return the files of the package's own games by their names, such as cut_in, sorted."""
+    # A name with a dot is that of a driver's timeline.
+    return {path.stem: path for path in sorted(scenarios_directory().glob('*.yaml'))
+            if '.' not in path.stem}
+
+
 def find_game(name: Path) -> Path:
     """
     Return the file of a game: the one named, or the package's own game of that name (`cut_in`).
@@ -128,11 +135,10 @@ def find_game(name: Path) -> Path:
     """
     if name.suffix or len(name.parts) > 1 or name.is_file():
         return name
-    own = {path.stem: path for path in scenarios_directory().glob('*.yaml')
-           if '.' not in path.stem}
+    own = own_games()
     if name.name not in own:
         raise InputError('is neither a file nor one of the games of this package', str(name),
-                         'these are ' + ', '.join(sorted(own)))
+                         'these are ' + ', '.join(own))
     return own[name.name]
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ids of the environments: one for each shipped game, one for any other, one for folders."""
 
-from crgame_ros.paths import scenarios_directory
+from crgame_ros.paths import own_games
 import gymnasium
 
 NAMESPACE = 'crgame'
@@ -13,13 +13,6 @@ _ENTRY = 'crgame_ros.gym.driving_env:DrivingEnv'
 _VECTOR_ENTRY = 'crgame_ros.gym.games_together:GamesTogether'
 
 
-def shipped_games() -> tuple[str, ...]:
-    """Return the names of the shipped games, such as cut_in."""
-    # A name with a dot is that of a driver's timeline.
-    return tuple(sorted(path.stem for path in scenarios_directory().glob('*.yaml')
-                        if '.' not in path.stem))
-
-
 def environment_id(game: str) -> str:
     """Return the id of a shipped game's environment, such as crgame/CutIn-v0."""
     return f'{NAMESPACE}/{"".join(word.capitalize() for word in game.split("_"))}-v0'
@@ -27,7 +20,7 @@ def environment_id(game: str) -> str:
 
 def register_all() -> None:
     """Register every environment with Gymnasium, unless it is registered already."""
-    shipped = {environment_id(game): {'game': game} for game in shipped_games()}
+    shipped = {environment_id(game): {'game': game} for game in own_games()}
     for name, keywords in {ANY_GAME: {}, FOLDER: {}, **shipped}.items():
         if name not in gymnasium.registry:
             gymnasium.register(name, entry_point=_ENTRY, vector_entry_point=_VECTOR_ENTRY,

@@ -10,8 +10,8 @@ from crgame_ros.errors import InputError
 from crgame_ros.gym.driving_env import DrivingEnv
 from crgame_ros.gym.games_together import GamesTogether
 from crgame_ros.gym.parallel_env import ParallelDrivingEnv
-from crgame_ros.gym.shipped_environments import ANY_GAME, environment_id, shipped_games
-from crgame_ros.paths import extra_install
+from crgame_ros.gym.shipped_environments import ANY_GAME, environment_id
+from crgame_ros.paths import extra_install, own_games
 import gymnasium
 from gymnasium.utils.env_checker import check_env
 import numpy as np
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.filterwarnings('error')
 
 @pytest.mark.matrix('cut_in', 'traffic')
 @pytest.mark.slow
-@pytest.mark.parametrize('game', shipped_games())
+@pytest.mark.parametrize('game', own_games())
 def test_gymnasium_accepts_every_environment(game: str) -> None:
     # The checker begins a dozen episodes, which share a placement of traffic.
     check_env(gymnasium.make(environment_id(game), worlds=1).unwrapped, skip_render_check=True)
@@ -41,7 +41,7 @@ class WithoutOptions(ParallelDrivingEnv):
 
 @pytest.mark.matrix('two_avs')
 @pytest.mark.slow
-@pytest.mark.parametrize('game', shipped_games())
+@pytest.mark.parametrize('game', own_games())
 def test_pettingzoo_accepts_every_game_with_all_its_seats(game: str) -> None:
     parallel_api_test(WithoutOptions(game=game, duration=1.0, worlds=1), num_cycles=12)
 
