@@ -45,7 +45,8 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
     :param dashboard: port of Dask's page, on the loopback; None for no page.
     :return: a `distributed.Client`.
     :raises InputError: if the scheduler does not answer.
-    :raises CrgameError: if a worker process ended while it started.
+    :raises CrgameError: if a worker process ended while it started, or a worker cannot compute
+        cells.
     """
     require_dask()
     import dask
@@ -62,6 +63,7 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
                              'start one with `dask scheduler`, and workers with `dask worker '
                              'ADDRESS --nthreads 1`') from error
         with client:
+            _check_workers(client)
             yield client
         return
     settings = {
@@ -84,6 +86,7 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
                               'command again, with fewer --workers if it happens again') \
                 from error
         with cluster, Client(cluster, set_as_default=False) as client:
+            _check_workers(client)
             yield client
 
 
@@ -92,12 +95,8 @@ def default_workers() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def check_workers(client: Any) -> None:
-    """
-    Check that the workers can compute cells.
-
-    :raises CrgameError: if one lacks this package.
-    """
+def _check_workers(client: Any) -> None:
+    """Check that no worker lacks this package."""
     for address, answer in client.run(_version, on_error='return').items():
         if isinstance(answer, BaseException):
             raise CrgameError(f'worker {address} cannot import crgame_ros ({answer}): install '

@@ -10,7 +10,7 @@ from pathlib import Path
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_grid import CellGrid, make_grid
 from crgame_ros.evaluation.content import ContentStore
-from crgame_ros.evaluation.dask_cluster import check_workers, dask_client
+from crgame_ros.evaluation.dask_cluster import dask_client
 from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.results.cell_rows import CellRows
@@ -117,7 +117,6 @@ def _compute(grid: CellGrid, finished: set[bytes], parts: ResultParts, store: Co
     from crgame_ros.evaluation.cell_process import Limits
     cells = (cell for cell in grid if bytes.fromhex(cell.key) not in finished)
     with dask_client(computing.scheduler, computing.workers, computing.dashboard) as client:
-        check_workers(client)
         tally.dashboard = client.dashboard_link if computing.dashboard is not None else ''
         batches = CellBatches(client, store, Limits(
             computing.timeout_s, computing.memory_bytes, BATCH_S), cells,

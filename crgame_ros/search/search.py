@@ -12,7 +12,7 @@ import warnings
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.evaluation.cell_grid import CellGrid, make_grid
 from crgame_ros.evaluation.cell_process import Limits
-from crgame_ros.evaluation.dask_cluster import check_workers, dask_client
+from crgame_ros.evaluation.dask_cluster import dask_client
 from crgame_ros.evaluation.evaluation import BATCH_S, Computing
 from crgame_ros.evaluation.file_names import GRID_FILE, SEARCH_FILE
 from crgame_ros.evaluation.folder import EvaluationFolder
@@ -142,7 +142,6 @@ def run_search(folder: Path, computing: Computing, began: Began, told: Told) -> 
     limits = Limits(computing.timeout_s, computing.memory_bytes, BATCH_S)
     with ResultParts(folder, computing.part_cells) as parts, \
             dask_client(computing.scheduler, computing.workers, computing.dashboard) as client:
-        check_workers(client)
         trials = Trials(settings, expectations, place, grid, parts, client, limits, told)
         phases = []
         smallest, probability = None, None
