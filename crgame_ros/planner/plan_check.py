@@ -84,11 +84,10 @@ def check_start(plan: Plan, request_ego: VehicleState, request_stamp_ns: int,
         return f'the plan has {len(states)} states; at most {LONGEST} are allowed'
     if len(states) < SHORTEST:
         return f'the plan has {len(states)} state; at least {SHORTEST} are needed'
-    if not np.isfinite(states).all():
-        row, column = np.argwhere(~np.isfinite(states))[0]
-        return f'{StateColumn(column).name.lower()} of state {row} is {states[row, column]}'
-    if np.abs(states).max() > LARGEST:
-        row, column = np.argwhere(np.abs(states) > LARGEST)[0]
+    # In this form, NaN is too large.
+    fits = np.abs(states) <= LARGEST
+    if not fits.all():
+        row, column = np.argwhere(~fits)[0]
         return f'{StateColumn(column).name.lower()} of state {row} is {states[row, column]:g}'
     x, y, yaw, speed = states[0, :4].tolist()
     distance = math.hypot(x - request_ego.x, y - request_ego.y)
