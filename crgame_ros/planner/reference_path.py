@@ -114,7 +114,7 @@ def _center_line(roads: RoadNetwork, route: Route, start_s: float, change: float
         lines = [roads.line(lanelet) for lanelet in leg]
         points = np.concatenate([line.points for line in lines])
         if index:
-            points = _from(points, entered)
+            points = points[arc_length(points) > entered + 0.5]
             position = 0.0
         if index + 1 < len(route.legs):
             following = roads.line(route.legs[index + 1][0])
@@ -149,11 +149,6 @@ def _blend(points: Array, s: Array, target: Curve, first: float,
     there = target.pose_at(along)[:, :2]
     weight = (u ** 3 * (10.0 - 15.0 * u + 6.0 * u ** 2))[:, None]
     return here * (1.0 - weight) + there * weight, float(along[-1])
-
-
-def _from(points: Array, start: float) -> Array:
-    """Cut a polyline off before an arc length."""
-    return points[arc_length(points) > start + 0.5]
 
 
 def _before(roads: RoadNetwork, lanelet: int, line: Array) -> Array:
