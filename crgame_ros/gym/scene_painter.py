@@ -6,7 +6,7 @@ from commonroad.scenario.lanelet import LaneletNetwork
 from crgame_ros.geometry.outline import outline, placed_at
 from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.gym.driving_game import DrivingGame
-from crgame_ros.roads.surface import lanelet_areas
+from crgame_ros.roads.surface import lanelet_areas, lanelet_ring
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
@@ -33,11 +33,8 @@ class ScenePainter:
     """
 
     def __init__(self, network: LaneletNetwork) -> None:
-        self._lanelets = [np.concatenate((item.left_vertices[:, :2],
-                                          item.right_vertices[::-1, :2]))
-                          for item in network.lanelets]
-        areas = lanelet_areas(list(network.lanelets))
-        self._tree = shapely.STRtree(areas)
+        self._lanelets = list(map(lanelet_ring, network.lanelets))
+        self._tree = shapely.STRtree(lanelet_areas(network.lanelets))
 
     def paint(self, game: DrivingGame) -> NDArray[np.uint8]:
         """Return a picture (HEIGHT, WIDTH, 3) of the current state."""

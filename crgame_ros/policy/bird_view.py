@@ -8,6 +8,7 @@ from commonroad.scenario.lanelet import LaneletNetwork
 from crgame_ros.geometry.outline import placed
 from crgame_ros.geometry.polyline import ReferencePath
 from crgame_ros.policy.seat_view import Surrounded
+from crgame_ros.roads.surface import lanelet_ring
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
@@ -33,9 +34,7 @@ class BirdView:
 
     def __init__(self, size: int, pixel: float, network: LaneletNetwork) -> None:
         self._size, self._pixel = size, pixel
-        self._lanelets = [np.concatenate((item.left_vertices[:, :2],
-                                          item.right_vertices[::-1, :2]))
-                          for item in network.lanelets]
+        self._lanelets = list(map(lanelet_ring, network.lanelets))
         self._tree = shapely.STRtree([
             shapely.box(*points.min(axis=0), *points.max(axis=0)) for points in self._lanelets])
         # From the rear axle to the farthest corner [m].
