@@ -294,13 +294,11 @@ class ExportedRoads:
     :param benchmark_id: its benchmark id.
     :param xml_text: the content of the file.
     :param pieces: its lanelets, in order.
-    :param problem_id: id of the planning problem; None without one.
     """
 
     benchmark_id: str
     xml_text: str
     pieces: tuple[Piece, ...]
-    problem_id: int | None
 
     def lanelets(self, lane: int) -> tuple[int, ...]:
         """Return the lanelets of a lane, in driving direction."""
@@ -341,8 +339,7 @@ def export_roads(roads: WaypointRoads, name: str, kind: LaneletKind = 'urban',
         lanelets.append(_lanelet(piece, bounds, kind, sign))
         if sign is not None:
             signs.append(_sign(sign, piece.speed_limit, bounds.right[0]))
-    problem_id = next(ids)
-    problem = _problem(problem_id, roads, drive, pieces)
+    problem = _problem(next(ids), roads, drive, pieces)
     benchmark_id = name if _ZAMUNDA.fullmatch(name) else (
         f'ZAM_{re.sub("[^A-Za-z0-9]", "", name)[:40] or "Roads"}-1_1_T-1')
     network = _HEAD.format(kind) + ''.join(lanelets + signs)
@@ -350,7 +347,7 @@ def export_roads(roads: WaypointRoads, name: str, kind: LaneletKind = 'urban',
     text = _document(benchmark_id, network + (problem if drive is not None else ''), where)
     # Check that the file can be loaded: the loader refuses more than the schema, e.g. large files.
     parse_scenario(text, f'{where} as a scenario')
-    return ExportedRoads(benchmark_id, text, pieces, None if drive is None else problem_id)
+    return ExportedRoads(benchmark_id, text, pieces)
 
 
 def _refuse_long(roads: WaypointRoads, where: str) -> None:
