@@ -33,6 +33,7 @@ from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 
+# Where the page is; if the port is taken, at the next free one.
 HOST, PORT = '127.0.0.1', 8080
 # An environment that is late by more than this does not catch up [s].
 _PATIENCE_S = 0.5
@@ -82,19 +83,18 @@ class PageViewer:
     """
     The server of the page, which shows a game in real time.
 
-    :param port: first port to try.
     :ivar url: address of the page.
     """
 
-    def __init__(self, port: int = PORT) -> None:
+    def __init__(self) -> None:
         self._backend = EnvironmentBackend()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name='page', daemon=True)
         self._thread.start()
-        access = Access(HOST, port)
+        access = Access(HOST, PORT)
         try:
             self._runner, port = asyncio.run_coroutine_threadsafe(listen(
-                create_app(self._backend, access, None), HOST, port), self._loop).result()
+                create_app(self._backend, access, None), HOST, PORT), self._loop).result()
         except BaseException:
             self._end_thread()
             raise
