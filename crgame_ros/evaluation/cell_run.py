@@ -92,14 +92,6 @@ def _inputs(cell: Cell, contents: Path) -> RecordedInputs:
              if name.startswith('command_')}, file['intervals_s'])
 
 
-def measured(cell: Cell, result: OfflineResult) -> Run:
-    """Return a run to tabulate."""
-    run = Run(cell.key, result=result,
-              scoring='all' if cell.condition.commonroad_scores else 'drives')
-    run.id = cell.key
-    return run
-
-
 def compute_cell(cell: Cell, contents: Path) -> CellRows:
     """
     Run and measure a cell.
@@ -110,7 +102,10 @@ def compute_cell(cell: Cell, contents: Path) -> CellRows:
     computed_s = time.process_time()
     result = run_cell(cell, contents)
     contacts = contacts_of(result)
-    vehicles = vehicle_rows(measured(cell, result), result, contacts)
+    run = Run(cell.key, result=result,
+              scoring='all' if cell.condition.commonroad_scores else 'drives')
+    run.id = cell.key
+    vehicles = vehicle_rows(run, result, contacts)
     durations_s = [time_s for record in result.planners.values()
                    for time_s in record.statistics.durations_s]
     return {
