@@ -89,15 +89,13 @@ class CellGrid:
     def _cells(self, scene: CellScene, variant: str, values: dict[str, object]) -> Iterator[Cell]:
         for planner, (perception, seen), (traffic, flow) in product(
                 self.planners, self.perception.items(), self.traffic.items()):
+            code = scene.digests if planner.choice is None else (planner.digest,)
             condition = Condition(
                 scene.scenario, scene.game, scene.human, planner.label, perception, traffic,
                 values, scene.inputs, planner.choice, seen, flow, self.duration_s,
                 self.latency_steps, self.commonroad_scores,
-                (self.engine, *self._code(scene, planner)), scene.participant, variant)
+                (self.engine, *code), scene.participant, variant)
             yield from (Cell(condition, seed) for seed in self.seeds)
-
-    def _code(self, scene: CellScene, planner: GridPlanner) -> tuple[str, ...]:
-        return (planner.digest,) if planner.choice is not None else scene.digests
 
     def as_dict(self) -> dict[str, object]:
         """Return the fields as a JSON-compatible dictionary."""
