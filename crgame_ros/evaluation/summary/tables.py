@@ -129,17 +129,13 @@ def quantity(value: float, measure: SummaryMeasure, signed: bool = False) -> str
 
 
 def _means(summary: Summary) -> SummaryTable:
-    counts = SummaryCell('cells finished'), *(SummaryCell(
+    counts = (SummaryCell('cells finished'), *(SummaryCell(
         str(group.cells), ', '.join((
             _number(group.scenarios, 'scenario'),
             *((_number(group.participants, 'participant'),) if group.participants else ()),
             *((f'{group.runs} different runs',) if group.runs < group.cells else ()))))
-        for group in summary.groups)
-    rows = [counts]
-    for place, measure in known_measures(summary):
-        rows.append((SummaryCell(measure_label(measure)), *(
-            _estimate(group.estimates[place], measure) for group in summary.groups)))
-    known = {place for place, _ in known_measures(summary)}
+        for group in summary.groups))
+    known = dict(known_measures(summary))
     unknown = [measure.label for place, measure in enumerate(summary.measures)
                if place not in known]
     notes = [
@@ -147,17 +143,26 @@ def _means(summary: Summary) -> SummaryTable:
         'their AVs (of the share that failed: over all cells); n counts the cells with a value; '
         'what is not defined, such as the TTC of a vehicle with none ahead, is left out',
         *_clusters(summary.groups)]
-    bounds = [f'{measure.label} {measure.most:g} {measure.unit}' for _, measure
-              in known_measures(summary) if math.isfinite(measure.most)]
+    bounds = [f'{measure.label} {measure.most:g} {measure.unit}' for measure in known.values()
+              if math.isfinite(measure.most)]
     if bounds:
         notes.append(f'greater values count as these: {", ".join(bounds)}')
     if any(measure.is_share and not group.estimates[place].value
-           for place, measure in known_measures(summary) for group in summary.groups):
+           for place, measure in known.items() for group in summary.groups):
         notes.append(_SHARE_OF_NONE)
     if unknown:
         notes.append(f'of no AV: {", ".join(unknown)}')
     return SummaryTable('means', 'Means', 'Mean, 95 % interval and n',
-                        ('', *map(_group, summary.groups)), tuple(rows), tuple(notes))
+                        ('', *map(_group, summary.groups)),
+                        (counts, *_measure_rows(summary, summary.groups)), tuple(notes))
+
+
+def _measure_rows(summary: Summary, groups: Sequence[GroupMeans] | Sequence[PairedDifferences],
+                  signed: bool = False) -> Iterator[tuple[SummaryCell, ...]]:
+    """Yield a row for each measure with any known value."""
+    for place, measure in known_measures(summary):
+        yield (SummaryCell(measure_label(measure)), *(
+            _estimate(group.estimates[place], measure, signed) for group in groups))
 
 
 def _group(group: GroupMeans | PairedDifferences) -> str:
@@ -198,15 +203,12 @@ def _differences(summary: Summary) -> SummaryTable:
                 ('baseline_failed', 'pairs of which the baseline alone failed'),
                 ('both_failed', 'pairs of which both failed'),
                 ('unpaired', 'cells that the baseline has not'))]
-    rows += [(SummaryCell(measure_label(measure)), *(
-        _estimate(group.estimates[place], measure, signed=True) for group in groups))
-        for place, measure in known_measures(summary)]
     notes = (f'difference from {summary.baseline} in the cell with the same other factors, '
              'of the means over their AVs; n counts the pairs of which both have a value',
              *_clusters(groups), _BY_CHANCE)
     return SummaryTable('differences', f'Differences from {summary.baseline}',
                         'Mean difference, 95 % interval and n', ('', *map(_group, groups)),
-                        tuple(rows), notes)
+                        (*rows, *_measure_rows(summary, groups, signed=True)), notes)
 
 
 def _worst(summary: Summary) -> SummaryTable:
