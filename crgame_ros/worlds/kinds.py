@@ -123,10 +123,8 @@ def _levelx(tracks: Path) -> WorldKind:
             return HIGHD
     for folder in tracks.parents:
         words = re.findall('[a-z]+', folder.name.lower())
-        for kind in _LEVELX:
+        for kind in (*_LEVELX, HIGHD):
             if kind.name in words:
                 return kind
-        if HIGHD.name in words:
-            return HIGHD
     raise InputError('is inD, rounD, exiD or uniD, but no folder of that name', str(tracks),
                      'say which it is with --format')
