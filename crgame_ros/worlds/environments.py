@@ -52,7 +52,7 @@ class Converter:
         """
         pins = config_directory() / 'converters' / f'{self.name}.txt'
         digest = hashlib.sha256(pins.read_bytes()).hexdigest()[:12]
-        folder = environments_folder() / f'{self.name}-{digest}'
+        folder = user_directory('cache') / 'converters' / f'{self.name}-{digest}'
         if not (folder / _STAMP).is_file():
             self._make(folder, pins, say)
         return folder / 'bin' / name
@@ -85,11 +85,6 @@ DESIGNER = Converter('designer', 'commonroad-scenario-designer 0.8.5', 'GPL-3.0-
 DATA_SET_CONVERTER = Converter('dataset_converter', 'commonroad-dataset-converter 2025.1.0',
                                'BSD-3-Clause', '0.6 GB')
 SUMO_TOOLS = Converter('sumo', "SUMO's netconvert 1.28.0", 'EPL-2.0', '0.5 GB')
-
-
-def environments_folder() -> Path:
-    """Return the folder of all converters' environments, in the user's cache."""
-    return user_directory('cache') / 'converters'
 
 
 def find_uv() -> str:
