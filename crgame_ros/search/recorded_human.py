@@ -49,11 +49,11 @@ def game_of_run(run: Path, folder: Path, other_planners: bool) -> Path:
     if not humans:
         raise InputError('no human drove in it', str(run), 'name a game with `vary:` instead')
     objects, vary = [], []
+    step_s = recorded.loaded.scenario.dt
     for column, vehicle in enumerate(log.vehicles):
         if vehicle.id not in humans:
             continue
         states = log.finite_vehicle_states[:, column]
-        step_s = recorded.loaded.scenario.dt
         name = f'recorded_{vehicle.id}'
         objects.append(ObjectSpec(
             # What has no type of its kind, such as a priority vehicle, moves as a car.
@@ -71,8 +71,7 @@ def game_of_run(run: Path, folder: Path, other_planners: bool) -> Path:
     game = recorded.game
     game = replace(
         game, scenario=folder / f'{name}.xml', humans=(), objects=(*game.objects, *objects),
-        vary=tuple(vary), expect=game.expect, duration=min(
-            game.duration, (len(log.ks) - 1) * recorded.loaded.scenario.dt),
+        vary=tuple(vary), duration=min(game.duration, (len(log.ks) - 1) * step_s),
         drivability=replace(game.drivability, stop=False))
     path, text = folder / f'{name}.yaml', game.dump()
     if path.exists() and path.read_text(encoding='utf-8') != text:
