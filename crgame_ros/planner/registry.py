@@ -106,29 +106,6 @@ class PlannerRegistry(ModelRegistry[Planner]):
 
 
 PLANNERS = PlannerRegistry()
-
-
-def planner_names() -> tuple[str, ...]:
-    """Return the registered names: those of the package first, then those of entry points."""
-    return PLANNERS.names()
-
-
-def create_planner(name: str, options: Mapping[str, object] | None = None) -> Planner:
-    """
-    Create a planner.
-
-    :param name: a registered name, `module:Class` or `path/to/file.py:Class`.
-    :param options: keyword arguments of its constructor.
-    :raises InputError: if there is no such planner, or an option is unknown, missing or of the
-        wrong type.
-    """
-    return PLANNERS.create(name, options)
-
-
-def planner_class(name: str) -> type[Planner]:
-    """
-    Find the class of a planner.
-
-    :raises InputError: if there is none of that name, or it is no `Planner`.
-    """
-    return PLANNERS.find(name)
+planner_names = PLANNERS.names
+create_planner = PLANNERS.create
+planner_class = PLANNERS.find
