@@ -16,7 +16,6 @@ from crgame_ros.evaluation.folder import EvaluationFolder
 from crgame_ros.evaluation.variants_page import (
     axis_values,
     Finding,
-    VariantPoint,
     VariantsView,
     write_variants_page,
 )
@@ -25,7 +24,7 @@ from crgame_ros.game.object_spec import BICYCLE_TYPES, ObjectSpec
 from crgame_ros.paths import make_folder
 from crgame_ros.recording.run_folder import GAME_FILE
 from crgame_ros.search.search import SearchResult
-from crgame_ros.search.text import boundary_slices, changes, told, values_text, verdict
+from crgame_ros.search.text import boundary_slices, changes, points, values_text
 from crgame_ros.search.trials import Outcome
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.variation.space import VariantSpace
@@ -149,9 +148,7 @@ def write_search_page(result: SearchResult, words: Sequence[str],
         words,
         [goal.measure for goal in result.settings.goals],
         [axis_values(axis) for axis in result.space.axes], result.space.nominal,
-        [VariantPoint(outcome.key, outcome.variant, outcome.values, verdict(outcome),
-                      told(outcome)) for outcome in result.outcomes],
-        list(boundary_slices(result)), links,
+        points(result), list(boundary_slices(result)), links,
         [Finding(place.name, changes(result.space, outcome.variant), outcome.values,
                  links[outcome.key]['report'], f'./run.sh {place / LIVE}',
                  f'./run.sh --replay {place}')

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 import json
 
-from crgame_ros.evaluation.variants_page import Verdict
+from crgame_ros.evaluation.variants_page import VariantPoint, Verdict
 from crgame_ros.search.boundary import pool_of
 from crgame_ros.search.search import SearchResult
 from crgame_ros.search.trials import Outcome
@@ -96,16 +96,18 @@ def _thresholds(result: SearchResult) -> Iterator[str]:
             yield f'alone, {axis.name} fails {sense} about ' + ', '.join(f'{x:.3g}' for x in at)
 
 
-def verdict(outcome: Outcome) -> Verdict:
-    """Return the verdict on an outcome."""
+def points(result: SearchResult) -> list[VariantPoint]:
+    """Return all variants with the verdicts on them."""
+    return [VariantPoint(
+        outcome.key, outcome.variant, outcome.values, _verdict(outcome),
+        outcome.excused or '; '.join(outcome.broken) or outcome.reason)
+        for outcome in result.outcomes]
+
+
+def _verdict(outcome: Outcome) -> Verdict:
     if not outcome.is_known:
         return 'unknown'
     return 'failure' if outcome.is_failure else 'excused' if outcome.excused else 'pass'
-
-
-def told(outcome: Outcome) -> str:
-    """Return the reason of an outcome's verdict, for people."""
-    return outcome.excused or '; '.join(outcome.broken) or outcome.reason
 
 
 def results_text(result: SearchResult, found: Sequence[str]) -> str:
@@ -119,10 +121,7 @@ def results_text(result: SearchResult, found: Sequence[str]) -> str:
         'goals': [asdict(goal) for goal in result.settings.goals],
         'expectations': [each.told() for each in result.expectations],
         'lines': list(found), 'nominal': result.space.nominal,
-        'outcomes': [{
-            'cell': outcome.key, 'variant': dict(outcome.variant),
-            'values': list(outcome.values), 'verdict': verdict(outcome), 'told': told(outcome)}
-            for outcome in result.outcomes],
+        'outcomes': [asdict(point) for point in points(result)],
         'probability': None if result.probability is None else asdict(result.probability),
         'smallest': None if result.smallest is None else result.smallest.key},
         ensure_ascii=False, allow_nan=False) + '\n'
