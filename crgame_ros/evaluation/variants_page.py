@@ -163,13 +163,14 @@ def write_variant_pages(folder: Path, grid: CellGrid, goals: Sequence[str]) -> I
     """
     # The tables are read once for all games.
     rows: dict[object, list[tuple[Row, Sequence[Row]]]] = {
-        scene.game: [] for scene in grid.scenes if scene.variants}
+        scene.label: [] for scene in grid.scenes if scene.variants}
     for row, vehicles in stored_rows(folder):
-        if row['game'] in rows:
-            rows[row['game']].append((row, vehicles))
+        label = row['human'] or row['game'] or row['scenario']
+        if label in rows:
+            rows[label].append((row, vehicles))
     for scene in grid.scenes:
         if scene.variants:
-            yield _write(folder, grid, scene, rows.pop(scene.game), goals or _GOALS)
+            yield _write(folder, grid, scene, rows.pop(scene.label), goals or _GOALS)
 
 
 def _write(folder: Path, grid: CellGrid, scene: CellScene,
@@ -189,7 +190,8 @@ def _write(folder: Path, grid: CellGrid, scene: CellScene,
         goals, axes, nominal, points,
         links={point.cell: {'report': f'{REPORTS}/{point.cell}.html'} for point in points
                if (folder / REPORTS / f'{point.cell}.html').exists()})
-    return write_variants_page(view, folder, f'variants-{scene.label}.html')
+    # Runs of one name are told apart by the folders above them.
+    return write_variants_page(view, folder, f'variants-{scene.label.replace("/", "-")}.html')
 
 
 def _point(row: Row, vehicles: Sequence[Row], expectations: Sequence[Expectation],

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Evaluations from Python: the same cells as runs of their own."""
 
+from dataclasses import replace
 import json
 from pathlib import Path
 import re
@@ -85,6 +86,29 @@ def test_the_page_of_variants_shows_the_worst_av(tmp_path: Path) -> None:
                      page.read_text())
     assert data is not None
     assert [point['values'] for point in json.loads(data[1])['points']] == [[7.0, 3.0]]
+
+
+def test_recorded_runs_of_a_game_that_varies_have_a_page_each(tmp_path: Path) -> None:
+    """Their cells name no game: they are told apart by the runs."""
+    place = EvaluationFolder(tmp_path)
+    grid = make_grid(parse_plan({
+        'games': [str(GAME.with_name('cut_in_family.yaml'))], 'planners': ['idm'],
+        'variants': {'number': 1}}, 'plan', tmp_path), place.store)
+    runs = ('morning/first', 'noon/first')
+    grid = replace(grid, scenes=tuple(
+        replace(grid.scenes[0], game='', human=run) for run in runs))
+    with ResultParts(tmp_path) as parts:
+        parts.add(*(rows_of(cell, {'cell': {'status': 'ok'}, 'work': {}, 'vehicles': [
+            {'vehicle': 'av0', 'role': 'autonomous', 'worst_min_distance': distance}]})
+            for cell, distance in zip(grid, (5.0, 3.0), strict=True)))
+    pages = list(write_variant_pages(tmp_path, grid, ('min_distance',)))
+    assert [page.name for page in pages] == [
+        'variants-morning-first.html', 'variants-noon-first.html']
+    for page, distance in zip(pages, (5.0, 3.0), strict=True):
+        data = re.search(r'<script id="data" type="application/json">(.*?)</script>',
+                         page.read_text())
+        assert data is not None
+        assert [point['values'] for point in json.loads(data[1])['points']] == [[distance]]
 
 
 def test_files_of_one_name_are_refused(tmp_path: Path,
