@@ -7,6 +7,7 @@ from contextlib import suppress
 import json
 import os
 from pathlib import Path
+from queue import SimpleQueue
 import resource
 import select
 import signal
@@ -161,21 +162,18 @@ def _read(stream: IO[bytes] | IO[str], timeout_s: float) -> bytes:
 
 def _messages() -> Iterator[str]:
     """Yield the texts of cells; end the process at once when the parent is gone."""
-    waiting: list[str] = []
-    there = threading.Semaphore(0)
+    waiting: SimpleQueue[str] = SimpleQueue()
 
     def listen() -> None:
         while True:
             try:
-                waiting.append(_read(sys.stdin, threading.TIMEOUT_MAX).decode())
+                waiting.put(_read(sys.stdin, threading.TIMEOUT_MAX).decode())
             except (OSError, EOFError):
                 os._exit(0)
-            there.release()
 
     threading.Thread(target=listen, daemon=True).start()
     while True:
-        there.acquire()
-        yield waiting.pop(0)
+        yield waiting.get()
 
 
 def dask_setup(_worker: object) -> None:
