@@ -94,10 +94,8 @@ class PlannerManager:
             if action is None or name in self._done:
                 continue
             self._done.add(name)
-            if isinstance(action, SpeedLimit):
-                said.append(self._limit(action))
-            else:
-                said.append(self._swap(name, action.planner))
+            said.append(self._limit(action) if isinstance(action, SpeedLimit)
+                        else self._swap(name, action.planner))
         return said
 
     def _limit(self, action: SpeedLimit) -> str:

@@ -112,10 +112,8 @@ def check_plan(plan: Plan, request_ego: VehicleState, request_stamp_ns: int,
     :param time_step_s: Delta t_c, the time between the plan's rows [s]
     :return: the reason for a refusal, with the state and the limit, or None.
     """
-    reason = check_start(plan, request_ego, request_stamp_ns, tolerances)
-    if reason is None:
-        reason = _check_limits(plan.states, vehicle, time_step_s, tolerances)
-    return reason
+    return check_start(plan, request_ego, request_stamp_ns, tolerances) or _check_limits(
+        plan.states, vehicle, time_step_s, tolerances)
 
 
 def _check_limits(states: Array, vehicle: VehicleParameters, dt_s: float,
