@@ -32,7 +32,6 @@ class Batch(NamedTuple):
     """
     Cells that a worker computes one after the other.
 
-    :param cells: in their order.
     :param rounds: how often they were sent before to workers that ended.
     """
 
@@ -60,10 +59,6 @@ class CellBatches:
     """
     The batches in computation: enough that no worker waits, collected as they end.
 
-    :param client: a `distributed.Client`.
-    :param store: store with the cells' contents.
-    :param limits: limits of cells and batches.
-    :param cells: cells to compute.
     :param number: their number.
     """
 

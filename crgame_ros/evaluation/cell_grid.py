@@ -56,10 +56,8 @@ class CellGrid:
     All combinations of scenes, planners, perception, traffic and seeds.
 
     :param scenes: scenes with different labels.
-    :param planners: planners of the AVs.
     :param perception: values by label.
     :param traffic: values by label.
-    :param seeds: seeds of all random values.
     :param duration_s: simulated duration of each cell; None for the games' [s]
     :param latency_steps: simulation steps between a request and its plan.
     :param commonroad_scores: whether CommonRoad's tools score each cell, too.

@@ -30,7 +30,6 @@ def report_cell(folder: Path, key: str, say: Callable[[str], object]) -> Path:
     """
     Run a cell again, and write its report, its recording and its scenario.
 
-    :param folder: folder of the evaluation.
     :param key: key of the cell, or its first digits.
     :param say: called with a line of progress, for people.
     :return: the report's file.
@@ -277,7 +276,6 @@ def summarise_command(folder: Path, values: argparse.Namespace) -> int:
     """
     Print the summary of an evaluation, and write its page into the folder.
 
-    :param folder: folder of the evaluation.
     :param values: values of the arguments that `add_summary_arguments` declares.
     :raises InputError: if the evaluation or an argument cannot be used.
     """

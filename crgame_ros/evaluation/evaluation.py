@@ -80,7 +80,6 @@ def evaluate(plan: EvaluationPlan, folder: Path, computing: Computing | None = N
     After an interruption for any reason, the same call continues.
 
     :param folder: folder of the evaluation; it is created, or must be an evaluation's.
-    :param computing: settings of the computation.
     :param told: called with the progress; with a cell and its row when one has ended.
     :param loading: called with the share of the plan loaded so far, 0 to 1.
     :raises InputError: if plan or folder cannot be used.

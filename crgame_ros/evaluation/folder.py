@@ -30,11 +30,7 @@ FORMAT = 1
 
 
 class EvaluationFolder:
-    """
-    An evaluation on disk.
-
-    :param path: path of its folder.
-    """
+    """An evaluation on disk."""
 
     def __init__(self, path: Path) -> None:
         # The games of its cells name files in it.

@@ -74,12 +74,10 @@ class VariantsView:
     """
     The content of the page.
 
-    :param title: heading.
     :param lines: what was found, a line each.
     :param goals: names of the measures of its points.
     :param axes: of what varies, as `axis_values` returns them.
     :param nominal: values of the game as it is.
-    :param points: all variants.
     :param slices: probability of a failure over pairs of dimensions: names x and y, and rows of
         probabilities from low to high y.
     :param links: by cell, addresses relative to the page by what they are.
@@ -156,7 +154,6 @@ def write_variant_pages(folder: Path, grid: CellGrid, goals: Sequence[str]) -> I
     Write a page for each game of an evaluation that varies.
 
     :param folder: of the evaluation.
-    :param grid: its grid.
     :param goals: measures to show; none for the least distance.
     :return: the files.
     :raises InputError: if a part is damaged, or a page cannot be written.

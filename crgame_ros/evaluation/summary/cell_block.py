@@ -27,7 +27,6 @@ class PartBatch(NamedTuple):
     Rows of parts that have the same columns.
 
     :param rows: rows with all requested columns; columns that the parts lack are empty.
-    :param columns: columns that the parts have.
     """
 
     rows: pa.RecordBatch
@@ -38,7 +37,6 @@ class EvaluatedParts:
     """
     The cells that were finished at construction; cells added later are not read.
 
-    :param folder: folder of the evaluation.
     :ivar rows: number of rows in the parts of `cells`.
     :ivar columns: columns that any part of `vehicles` has.
     :raises InputError: if there is no part, or one cannot be read.
@@ -192,8 +190,6 @@ class CellBlock:
     """
     A block of cells (N), each once, in the order of their keys.
 
-    :param number: number of the block.
-    :param keys: keys of the cells.
     :param labels: (N, 7) numbers of their labels, in the order of `TEXT_FACTORS`.
     :param seeds: (N)
     :param pairs: (N) digests, equal for cells that share all factors but the planner.
@@ -221,7 +217,6 @@ class CellBlocks:
     Each block reads all parts and keeps its own rows. A cell that was run again counts once, as
     ok if any of its runs succeeded.
 
-    :param parts: parts of the evaluation.
     :param block_cells: approximate number of cells in a block.
     :ivar labels: labels of each text factor.
     :ivar count: number of blocks.
@@ -324,7 +319,6 @@ class CellGroups:
     """
     Cells that share the labels of some factors.
 
-    :param blocks: the cells.
     :param by: the factors.
     :ivar labels: labels of each group by its number, in the order of their first cells.
     """

@@ -145,7 +145,6 @@ class CellTally:
     """
     The counts of all cells.
 
-    :param groups: groups of the cells.
     :param baseline: planner that others are compared with; empty for none.
     :param baseline_number: number of its label.
     :ivar cells: cells of each group, by the group's number.

@@ -190,7 +190,6 @@ def summarise(folder: Path, *, measures: Sequence[str] | None = None,
     """
     Summarise the finished cells.
 
-    :param folder: folder of the evaluation.
     :param measures: names of measures, or of numeric columns of the table `vehicles`; None for
         all measures available.
     :param by: factors that define groups: cells with equal values of these are a group.

@@ -108,7 +108,6 @@ class WorstCell:
     """
     One of the worst cells, judged by its worst AV.
 
-    :param key: key of the cell.
     :param factors: its labels and its seed, in the order of `FACTORS`.
     :param vehicle: id of that AV.
     :param values: values by which it was chosen, in the order of `Summary.worst_by`.
@@ -126,7 +125,6 @@ class FailureReason:
     Cells that failed in the same way.
 
     :param status: kind of failure.
-    :param reason: reason of the failure.
     :param cells: number of cells, by labels of their groups.
     :param example: key of one of the cells.
     :param traceback: traceback of that cell, if there is one.
@@ -149,7 +147,6 @@ class Summary:
     """
     The summary of an evaluation.
 
-    :param folder: folder of the evaluation.
     :param by: factors that define the groups.
     :param baseline: planner with which others are compared; empty for none.
     :param measures: measures with means.

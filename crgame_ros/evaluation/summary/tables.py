@@ -40,7 +40,6 @@ class SummaryCell(NamedTuple):
     """
     The content of a table's cell.
 
-    :param text: main text.
     :param detail: secondary text; empty for none.
     :param mark: `better` or `worse` for a clear difference; empty otherwise.
     """
@@ -56,7 +55,6 @@ class SummaryTable:
     A table of a summary.
 
     :param key: unique key.
-    :param title: title.
     :param caption: meaning of its rows.
     :param head: names of the columns.
     :param rows: rows, each as long as the head.
