@@ -44,9 +44,6 @@ class Experiment:
     """
     The settings that all episodes of an environment share; see `docs/gym.md`.
 
-    :param setups: setups of the scenes.
-    :param seats: seats of the agents.
-    :param action: kind of the actions.
     :param observation: content of the observations.
     :param reward: terms of the reward.
     :param ends: events that terminate an episode.
@@ -138,8 +135,6 @@ class AgentGame:
     One game and its agents.
 
     :param experiment: settings that its episodes share.
-    :param setups: setups of its episodes.
-    :param scene: name of its scene.
     :param driving: makes the game, which moves all vehicles and objects.
     :ivar game: this game.
     """

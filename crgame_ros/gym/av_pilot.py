@@ -22,9 +22,6 @@ class AvPilot:
     uses, would cost more than the rest of the step. An AV with a perception model gets the same
     data as its planner would.
 
-    :param setup: setup of the run.
-    :param index: index of the AV.
-    :param simulation: simulation of the run.
     :param view: view of the true world.
     """
 

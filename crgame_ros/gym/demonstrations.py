@@ -61,7 +61,6 @@ class Demonstration:
     """
     An episode of a person who drove.
 
-    :param run: name of the run.
     :param seed: of the run's game.
     :param observations: (T + 1) by part.
     :param actions: (T, 2) `pedals`: means over the steps of each decision.
@@ -210,7 +209,6 @@ def write_demonstrations(dataset_id: str, runs: Sequence[Path], seat: str = 'hv0
     :param dataset_id: such as `cut_in/people-v0`.
     :param runs: folders of runs, or recordings.
     :param seat: the people's vehicle.
-    :param author: of the data set.
     :param observation: parts of the observation.
     :param keywords: as for `demonstration`.
     :return: the episodes.

@@ -47,8 +47,6 @@ class ContactSearch:
     A search for contacts at all simulation steps of a tick, done once at its end.
 
     Bodies that cannot be reached within the tick are excluded first.
-
-    :param setup: the run.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -132,11 +130,8 @@ class AgentSeat:
     """
     The seat of an agent.
 
-    :param id: id of the vehicle.
     :param row: index of the vehicle among the driven ones.
     :param vehicle: setup of the vehicle.
-    :param view: view of the world from it.
-    :param guide: guide along its route.
     :param inverse: inverse of its powertrain, from acceleration to pedals.
     :param watch: check of its goal.
     :param manoeuvres: its manoeuvres, if the actions are such.
@@ -145,7 +140,6 @@ class AgentSeat:
     :param around: surroundings at the last decision.
     :param place: place on the route at the last decision.
     :param before: state at the decision before, and the place on the route then.
-    :param action: current action.
     :param centers: (T, 3) its centres in the road's coordinates, at the steps since the last
         decision
     :param hit: ids of those that it has touched since then.
@@ -187,7 +181,6 @@ class DrivingGame:
 
     :param setup: setup of any of its episodes, which differ in traffic and in the starts.
     :param seats: ids of the agents' vehicles.
-    :param action: kind of the actions.
     :param ticks: number of scenario steps for which an action holds.
     :raises InputError: if there is no such seat, or it does not support these actions.
     """

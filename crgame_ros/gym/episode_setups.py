@@ -53,8 +53,6 @@ class EpisodeSetups:
     """
     A factory of episodes' setups from their seeds.
 
-    :param game: game of all episodes.
-    :param vary: variation of the start.
     :param worlds: number of traffic placements that the seeds share; None makes one for each
         seed, which takes 0.1 s and more.
     :param loaded: scenario of the game, if it is loaded already.

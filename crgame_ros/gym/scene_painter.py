@@ -26,11 +26,7 @@ _AHEAD, _STEP = 80.0, 2.0
 
 
 class ScenePainter:
-    """
-    A painter of games on one road, north up, centred on the first agent's vehicle.
-
-    :param network: the road.
-    """
+    """A painter of games on one road, north up, centred on the first agent's vehicle."""
 
     def __init__(self, network: LaneletNetwork) -> None:
         self._lanelets = list(map(lanelet_ring, network.lanelets))

@@ -72,7 +72,6 @@ def one_scene(game: Game | Path | str | None, scenario: Path | str | None,
 
     :param game: a game, its file, or the name of a shipped one, such as `cut_in`.
     :param scenario: a CommonRoad file, or a benchmark id, instead.
-    :param seats: seats of the agents.
     :raises InputError: if the file cannot be read.
     """
     if scenario is not None:
@@ -97,7 +96,6 @@ def folder_scenes(folder: Path | str, split: str, test_share: float,
 
     :param split: `train`, `test` or `all`.
     :param test_share: share of the scenes in the test split, about.
-    :param seats: seats of the agents.
     :raises InputError: if there are no scenes, or a file is neither.
     """
     if split not in SPLITS:
@@ -184,8 +182,6 @@ class SceneSetups:
 
     The scenes used last stay in memory.
 
-    :param scenes: the scenes.
-    :param vary: variation of the start.
     :param worlds: as for `EpisodeSetups`.
     """
 

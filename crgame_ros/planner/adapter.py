@@ -59,7 +59,6 @@ class PlannerAdapter:
     that, the answer is a braking plan. Fallbacks and shortened plans are counted. Exits and
     interrupts pass.
 
-    :param planner: the planner.
     :param clock: seconds from a steady clock, to time each call; None measures nothing.
     """
 

@@ -92,7 +92,6 @@ class CollisionSlices:
 
     A pose off the road, further than the ego is now, counts as a collision too.
 
-    :param context: of the planner.
     :param margin: enlargement of obstacles on each side [m]
     """
 

@@ -36,7 +36,6 @@ class PlannerManager:
     After a change of speed limits the active planner is set up again at once, and each other one
     when it becomes active.
 
-    :param context: of the planners.
     :param name: of the game's planner for the AV.
     :param options: of that planner.
     :param events: all events of the game.
@@ -177,7 +176,6 @@ def planner_status(av: str, k: int, plan: Plan, manager: PlannerManager) -> Stat
 
     :param av: its id.
     :param k: scenario step of the request.
-    :param plan: the answer.
     :param manager: of the planner; without a clock, its status has no planning time.
     :return: None if there is nothing to tell.
     """

@@ -268,7 +268,6 @@ class Clearance:
     From the full distance on, speed is free. With less room, the vehicle passes more slowly, down
     to `CREEPING`.
 
-    :param context: of the planner.
     :param distance: the full one, between the bodies [m]
     """
 

@@ -160,7 +160,6 @@ class RoadLimit:
     A check of a vehicle's poses against the road and its present overhang.
 
     :param road: boundary of the road; None if the vehicle may leave it.
-    :param vehicle: the vehicle.
     """
 
     def __init__(self, road: 'RoadBoundary | None', vehicle: VehicleParameters) -> None:

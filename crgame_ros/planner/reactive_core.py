@@ -131,7 +131,6 @@ class ReactiveCore:
     """
     The package's planner on a driving path, for one request after the other.
 
-    :param context: of the planner.
     :param config: configuration of the package.
     :param margin: enlargement of obstacles on each side [m]
     :param clearance: of people; None for none.

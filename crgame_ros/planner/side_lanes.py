@@ -202,7 +202,6 @@ class LaneChange:
     """
     The first lane change of a path.
 
-    :param context: of the planner.
     :param driving: the path with the change.
     :param start: where the path was planned from.
     :param projector: of the obstacles.

@@ -199,8 +199,6 @@ class PedalInverse:
     The inverse of a human's controls: pedals and wheel from acceleration and curvature.
 
     A motion beyond the range of the controls is approximated. The lag of the powertrain remains.
-
-    :param vehicle: its parameters.
     """
 
     def __init__(self, vehicle: VehicleParameters) -> None:

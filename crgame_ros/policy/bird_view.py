@@ -29,7 +29,6 @@ class BirdView:
 
     :param size: height and width [px]
     :param pixel: side of a pixel [m]
-    :param network: the roads.
     """
 
     def __init__(self, size: int, pixel: float, network: LaneletNetwork) -> None:
@@ -45,7 +44,6 @@ class BirdView:
         """
         Return a picture (3, H, W).
 
-        :param around: the vehicle and its surroundings.
         :param path: the route.
         :param s: arc length on it [m]
         """

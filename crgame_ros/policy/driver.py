@@ -32,8 +32,6 @@ class DrivenSeat:
     :param row: of its vehicle among the driven ones.
     :param driven: (V) all driven vehicles.
     :param others: (M) all other objects that can appear.
-    :param scenario: the road.
-    :param vehicle: its parameters.
     :param start: initial state, rear axle, simulation coordinates.
     :param transform: from simulation coordinates to those of the road.
     :param steps_per_tick: simulation steps in a scenario step.
@@ -61,7 +59,6 @@ class PolicyDriver(DriverSource):
     A policy that fails is a problem of the seat until the next run: its driver counts as lost.
 
     :param policy: its action is `acceleration` or `pedals`.
-    :param seat: the seat that the policy takes.
     :raises InputError: if its actions become plans, which pedals cannot drive.
     """
 

@@ -39,10 +39,8 @@ class Manoeuvres:
     The lane is that of the vehicle, and where lanes fork the one of its route. Others are not
     heeded: gaps and distances are left to the policy.
 
-    :param scenario: with the roads.
     :param problem: the planning problem, for the route; None follows the lane.
     :param start: initial state, rear axle.
-    :param vehicle: its parameters.
     :raises PlanningError: if there is no road to follow.
     """
 

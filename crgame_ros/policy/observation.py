@@ -38,8 +38,6 @@ class Observation:
     """
     The observation of one kind of vehicle on the same roads.
 
-    :param spec: parts of the observation.
-    :param vehicle: parameters of the vehicle.
     :param scenario: with the roads, for the image.
     """
 

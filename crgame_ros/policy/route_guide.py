@@ -76,7 +76,6 @@ class RouteGuide:
     :param scenario: with at least one lanelet.
     :param problem: None follows the lane.
     :param start: initial state of the vehicle, rear axle, scenario coordinates.
-    :param vehicle: its parameters.
     :raises PlanningError: if there is no road to follow.
     """
 

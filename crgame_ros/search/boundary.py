@@ -38,7 +38,6 @@ class Boundary:
     """
     A Gaussian-process classifier of failing and passing variants.
 
-    :param space: of the variants.
     :param outcomes: of variants that could be run; some fail, and some do not.
     """
 
@@ -86,11 +85,7 @@ def can_learn(outcomes: Sequence[Outcome]) -> bool:
 
 def refine_boundary(space: VariantSpace, trials: Trials, settings: SearchSettings,
                     runs: int) -> None:
-    """
-    Run variants near the boundary, where the model is least certain.
-
-    :param runs: number of runs.
-    """
+    """Run variants near the boundary, where the model is least certain."""
     end = len(trials.outcomes) + runs
     turn = 0
     while (count := min(max(_TOGETHER, settings.batch), end - len(trials.outcomes))) > 0 \
@@ -179,7 +174,6 @@ def estimate(space: VariantSpace, trials: Trials, settings: SearchSettings,
     and weighted by how much more often that is. Runs of before count only in the model, so that
     the estimate is unbiased.
 
-    :param runs: number of runs.
     :return: None without runs.
     """
     if runs <= 0 or trials.left <= 0:

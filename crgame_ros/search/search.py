@@ -59,8 +59,6 @@ class SearchResult:
     """
     What a search found.
 
-    :param settings: of the search.
-    :param space: of the variants.
     :param expectations: what a run had to keep.
     :param outcomes: of all variants, in the order in which they were chosen.
     :param phases: name and number of runs of each part.
@@ -129,7 +127,6 @@ def run_search(folder: Path, computing: Computing, began: Began, told: Told) -> 
     Run a search, or go on with it; runs that are in its folder are not run again.
 
     :param folder: of a search that has begun.
-    :param computing: settings of the computation.
     :raises InputError: if the folder cannot be used.
     :raises CrgameError: if the scheduler is lost; what was finished is kept.
     """
@@ -184,8 +181,6 @@ def explore(space: VariantSpace, trials: Trials, settings: SearchSettings, runs:
 
     A batch is chosen before any of it is run, so that the variants do not depend on the order in
     which runs end.
-
-    :param runs: number of runs.
     """
     import optuna
     optuna.logging.set_verbosity(optuna.logging.ERROR)
@@ -277,7 +272,6 @@ def shrink(space: VariantSpace, trials: Trials, settings: SearchSettings,
     From the nearest failures that are known: single values are put back while it still fails, then
     the line to the game as it is is halved, then the neighbourhood is tried.
 
-    :param runs: number of runs.
     :return: the nearest failure that is known; None without failures, or where the game as it is
         fails: then it takes no change.
     """

@@ -67,13 +67,8 @@ class Trials:
     """
     The variants of a search, run in batches on the workers of an evaluation.
 
-    :param settings: of the search.
     :param expectations: what a run has to keep.
-    :param place: folder of the evaluation.
     :param grid: grid of one scene without variants.
-    :param parts: tables for the rows.
-    :param client: a `distributed.Client`.
-    :param limits: limits of cells and batches.
     :param told: called with each outcome.
     """
 

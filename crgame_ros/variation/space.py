@@ -47,11 +47,7 @@ _DRAWN = 1000
 
 
 class Axis:
-    """
-    A dimension with its distribution.
-
-    :param spec: its declaration.
-    """
+    """A dimension with its distribution."""
 
     def __init__(self, spec: Dimension) -> None:
         self.spec, self.name = spec, spec.name

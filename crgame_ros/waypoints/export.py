@@ -291,7 +291,6 @@ class ExportedRoads:
     """
     Way-point roads as a scenario.
 
-    :param benchmark_id: its benchmark id.
     :param xml_text: the content of the file.
     :param pieces: its lanelets, in order.
     """
