@@ -34,10 +34,12 @@ which you can drive yourself: ./run.sh searches/game/found/1/live.yaml
 docs/search.md tells more."""
 _DEFAULT_GOAL = 'ttc'
 SEARCHES = Path('searches')
+# Options that are settings of the same names.
+_SETTINGS = ('budget', 'batch', 'seed', 'sampler', 'explore_only', 'unavoidable')
 # What a search is, which a folder of one states already.
 _DEFAULTS: dict[str, object] = {
-    'minimise': [], 'maximise': [], 'planner': None, 'option': [], 'budget': 500, 'seed': 0,
-    'sampler': 'tpe', 'batch': 4, 'explore_only': False, 'unavoidable': False, 'out': None}
+    'minimise': [], 'maximise': [], 'planner': None, 'option': [], 'out': None,
+    **{name: getattr(SearchSettings, name) for name in _SETTINGS}}
 INSTALL = extra_install('search')
 
 
@@ -153,8 +155,8 @@ def _settings(values: argparse.Namespace, game: Path) -> SearchSettings:
     return SearchSettings(
         str(game.resolve()), goals,
         named_file(values.planner, Path.cwd()) if values.planner else '',
-        dict(read_options(values.option)), values.budget, values.batch, values.seed,
-        values.sampler, values.explore_only, values.unavoidable)
+        dict(read_options(values.option)),
+        **{name: getattr(values, name) for name in _SETTINGS})
 
 
 def _check_within(name: str, value: int, least: int, most: int) -> None:
