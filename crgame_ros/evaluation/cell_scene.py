@@ -25,7 +25,7 @@ from crgame_ros.recording.recorded_game import (
     with_recorded_events,
 )
 from crgame_ros.recording.run_cycles import replay_inputs, ReplayInputs
-from crgame_ros.recording.run_folder import folder_name, participant_folder, recording_in
+from crgame_ros.recording.run_folder import BAG, folder_name, participant_folder, recording_in
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.writing import write
@@ -288,8 +288,8 @@ def runs_of(names: tuple[str, ...], base: Path) -> list[Path]:
     found: list[Path] = []
     for name in names:
         path = base / expanded(name)
-        inside = sorted(item.parent for item in path.glob('*/bag'))
+        inside = sorted(item.parent for item in path.glob(f'*/{BAG}'))
         if not path.exists():
             raise InputError('there is no such file or folder', str(path), 'check the path')
-        found += inside if inside and not (path / 'bag').exists() else [path]
+        found += inside if inside and not (path / BAG).exists() else [path]
     return list(dict.fromkeys(found))

@@ -17,7 +17,7 @@ from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.variation_spec import Dimension
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.recorded_game import read_recorded_game
-from crgame_ros.recording.run_folder import folder_name, recording_in
+from crgame_ros.recording.run_folder import BAG, folder_name, recording_in
 from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.vehicle.state import StateColumn
 from crgame_ros.whole_file import write_text
@@ -103,4 +103,4 @@ def _fastest(states: NDArray[np.float64], step_s: float) -> float:
 
 def is_recording(path: Path) -> bool:
     """Return whether a path is a recorded run."""
-    return (path / 'bag').is_dir() or (path / METADATA_FILE).exists()
+    return (path / BAG).is_dir() or (path / METADATA_FILE).exists()
