@@ -84,7 +84,7 @@ def run(values: argparse.Namespace) -> int:
     :raises InputError: if anything cannot be used.
     """
     _require()
-    from crgame_ros.search.findings import write_findings, write_search_page
+    from crgame_ros.search.findings import LIVE, write_findings, write_search_page
     from crgame_ros.search.progress import SearchProgress
     from crgame_ros.search.search import begin, run_search
     from crgame_ros.search.text import lines, results_text
@@ -115,7 +115,7 @@ def run(values: argparse.Namespace) -> int:
     for line in words:
         print(line)
     if found:
-        print(f'drive one yourself: ./run.sh {found[-1][1] / "live.yaml"}')
+        print(f'drive one yourself: ./run.sh {found[-1][1] / LIVE}')
     print(page)
     return 0
 
