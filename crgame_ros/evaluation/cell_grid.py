@@ -4,7 +4,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -95,13 +95,9 @@ class CellGrid:
                 (self.engine, *code), scene.participant, variant)
             yield from (Cell(condition, seed) for seed in self.seeds)
 
-    def as_dict(self) -> dict[str, object]:
-        """Return the fields as a JSON-compatible dictionary."""
-        return asdict(self)
-
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """Build the grid from the dictionary of `as_dict`."""
+        """Build the grid from the dictionary of `dataclasses.asdict`."""
         return cls(**values | {
             'scenes': tuple(CellScene(**scene | {
                 name: tuple(scene.get(name, ())) for name in ('digests', 'variants')})

@@ -182,8 +182,7 @@ def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
         if (values.plan / SEARCH_FILE).exists():
             raise InputError('is of a search', str(values.plan),
                              f'go on with it: crgame search {values.plan}')
-        place = EvaluationFolder(values.plan)
-        return parse_plan(place.plan_values(), str(values.plan), place.base), values.plan
+        return EvaluationFolder(values.plan).plan(str(values.plan)), values.plan
     base = values.plan.parent
     read = read_yaml(values.plan, 'plan')
     if isinstance(read, dict):

@@ -3,7 +3,7 @@
 """The folder of an evaluation: its plan and files beside the tables, to repeat any cell."""
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import asdict, replace
 import json
 import os
 from pathlib import Path
@@ -16,7 +16,7 @@ from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_grid import CellGrid
 from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.file_names import FILES, GRID_FILE, VARIANTS_FILE
-from crgame_ros.evaluation.plan import EvaluationPlan
+from crgame_ros.evaluation.plan import EvaluationPlan, parse_plan
 from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
 from crgame_ros.evaluation.results.parts import LOCK
 from crgame_ros.recording.export import prepare_folder
@@ -56,8 +56,7 @@ class EvaluationFolder:
         :raises InputError: if the folder cannot be written.
         """
         note = {'format': FORMAT, 'version': __version__, 'plan': write(plan),
-                'base': str(plan.base.resolve()),
-                'grid': grid.as_dict()}
+                'base': str(plan.base.resolve()), 'grid': asdict(grid)}
         write_text(json.dumps(note, indent=1) + '\n', self.path / GRID_FILE)
         package = {
             '$schema': PROFILE.format('datapackage'),
@@ -108,18 +107,15 @@ class EvaluationFolder:
         return replace(grid, scenes=(replace(scene, variants=(
             *scene.variants, *(json.loads(line) for line in lines if line.endswith('}')))),))
 
-    def plan_values(self) -> dict[str, object]:
+    def plan(self, where: str) -> EvaluationPlan:
         """
-        Read the plan's values.
+        Read the plan.
 
+        :param where: the folder, for messages.
         :raises InputError: if the folder holds no evaluation.
         """
-        return self._note()['plan']
-
-    @property
-    def base(self) -> Path:
-        """Return the directory against which the plan's file names are resolved."""
-        return Path(self._note()['base'])
+        note = self._note()
+        return parse_plan(note['plan'], where, Path(note['base']))
 
     def _note(self) -> dict[str, Any]:
         path = self.path / GRID_FILE

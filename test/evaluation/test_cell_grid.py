@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The cells of a plan, and the inputs of their keys."""
 
+from dataclasses import asdict
 from hashlib import sha256
 import json
 from pathlib import Path
@@ -51,7 +52,7 @@ def test_every_scene_meets_everything(plan: dict[str, Any], tmp_path: Path) -> N
     assert len(found) == len(cells) == len({cell.key for cell in cells}) == 8
     assert {cell.label for cell in cells} >= {
         'cut_in · idm · blind · seed 0', 'cut_in · mine.py:Mine · blind · none · seed 1'}
-    again = CellGrid.from_dict(json.loads(json.dumps(found.as_dict())))
+    again = CellGrid.from_dict(json.loads(json.dumps(asdict(found))))
     assert [cell.key for cell in again] == [cell.key for cell in cells]
     assert all(cell_of(cell.text) == cell for cell in again)
     assert all(cell.key == sha256(cell.text.encode()).hexdigest()[:KEY_DIGITS] for cell in again)
