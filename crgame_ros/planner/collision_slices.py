@@ -6,12 +6,11 @@ import math
 from typing import NamedTuple
 
 from commonroad_dc import pycrcc
-from crgame_ros.errors import PlanningError
 from crgame_ros.geometry.outline import outline
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.messages.plan import PlanRequest
 from crgame_ros.planner.interface import PlannerContext
-from crgame_ros.planner.path_obstacles import prolong
+from crgame_ros.planner.path_obstacles import described_shape, prolong
 from crgame_ros.planner.plan_check import RoadLimit
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
@@ -148,7 +147,7 @@ class CollisionSlices:
         name = request.obstacle_ids[column]
         if self._follows(request.ego, pose, name):
             return None
-        shape = self._described(name)
+        shape = described_shape(self._objects, name)
         for margin in (self._margin, *CORES):
             body = _Body.of(shape, margin)
             if body is None or math.isnan(pose[0]) or not ego.collide(body.at(*pose.tolist())):
@@ -159,7 +158,8 @@ class CollisionSlices:
         """Return whether an obstacle drives behind the ego's rear in its lane, or into it."""
         dx, dy = float(pose[0]) - ego.x, float(pose[1]) - ego.y
         cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
-        rear, width, shape = self._vehicle.rear, self._vehicle.width, self._described(name)
+        rear, width = self._vehicle.rear, self._vehicle.width
+        shape = described_shape(self._objects, name)
         along, aside = dx * cos + dy * sin, abs(dy * cos - dx * sin)
         behind = along + 0.5 * shape.length < rear and aside < 0.5 * width + 1.0
         pushing = along < rear and aside < 0.5 * (width + shape.width)
@@ -168,8 +168,3 @@ class CollisionSlices:
     def _footprint(self, ego: VehicleState) -> pycrcc.RectOBB:
         x, y = ego.center(self._vehicle.rear_to_center)
         return pycrcc.RectOBB(0.5 * self._vehicle.length, 0.5 * self._vehicle.width, ego.yaw, x, y)
-
-    def _described(self, name: str) -> Shape:
-        if name not in self._objects:
-            raise PlanningError(f'the request contains "{name}", which has no description')
-        return self._objects[name].shape

@@ -14,6 +14,7 @@ from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.polyline import ReferencePath
 from crgame_ros.geometry.reference_point import seen_from, zero_for_nan
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.messages.plan import PlanRequest
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.vehicle.stopping import FIRM_BRAKING
@@ -165,14 +166,12 @@ class ObstacleProjector:
     def _describe(self, ids: tuple[str, ...]) -> None:
         if ids == self._ids:
             return
-        unknown = [name for name in ids if name not in self._objects]
-        if unknown:
-            raise PlanningError(f'the request contains "{unknown[0]}", which has no description')
-        outlines = [outline(self._objects[name].shape, CIRCLE_CORNERS, False) for name in ids]
+        shapes = [described_shape(self._objects, name) for name in ids]
+        outlines = [outline(shape, CIRCLE_CORNERS, False) for shape in shapes]
         corners = max((len(points) for points in outlines), default=4)
         self._outlines = np.array([np.resize(points, (corners, 2)) for points in outlines]
                                   ).reshape(len(ids), corners, 2)
-        self._radii = np.array([self._objects[name].shape.radius for name in ids])
+        self._radii = np.array([shape.radius for shape in shapes])
         self._ids = ids
 
     def _near(self, path: ReferencePath, corridor: Corridor, poses: Array) -> NDArray[np.intp]:
@@ -191,6 +190,17 @@ class ObstacleProjector:
         # An ego far beyond the path's end has no part of it, and no obstacle, near it.
         nearest = np.where(present.any(axis=0), distance.min(axis=1, initial=np.inf), np.inf)
         return np.flatnonzero(nearest < limit)
+
+
+def described_shape(objects: Mapping[str, ObjectDescription], name: str) -> Shape:
+    """
+    Return the shape of an object.
+
+    :raises PlanningError: if it was never described.
+    """
+    if name not in objects:
+        raise PlanningError(f'the request contains "{name}", which has no description')
+    return objects[name].shape
 
 
 def prolong(request: PlanRequest, steps: int) -> tuple[Array, Array]:
