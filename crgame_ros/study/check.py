@@ -19,12 +19,7 @@ from crgame_ros.study.file import Break, DeviceCheck, Page, Questions, StudyFile
 from crgame_ros.study.followed_session import judged_by, judging_question
 from crgame_ros.study.local_text import LocalText
 from crgame_ros.study.question import ChoiceQuestion, Question
-from crgame_ros.study.questionnaire import (
-    load_questionnaire,
-    page_file,
-    questionnaire_name,
-    steps_of,
-)
+from crgame_ros.study.questionnaire import page_file, scale_of, steps_of
 from crgame_ros.study.session_script import (
     drives_of,
     Fields,
@@ -134,7 +129,7 @@ def _reading_s(study: StudyFile, item: SessionItem) -> float:
     if isinstance(what, Fields):
         return QUESTION_S * len(study.fields)
     if isinstance(what, Questions):
-        return QUESTION_S * len(load_questionnaire(questionnaire_name(study, what)).questions)
+        return QUESTION_S * len(scale_of(study, what).questions)
     return DEVICE_S
 
 
@@ -165,7 +160,7 @@ def _steps(study: StudyFile) -> Iterator[StudyFinding]:
             yield from _page(study, step)
         elif isinstance(step, Questions):
             try:
-                scale = load_questionnaire(questionnaire_name(study, step))
+                scale = scale_of(study, step)
             except CrgameError as error:
                 yield StudyFinding('error', str(error))
                 continue
@@ -209,7 +204,7 @@ def _conditions_on_answers(study: StudyFile) -> Iterator[StudyFinding]:
     for step in dict.fromkeys(steps_of(study)):
         with suppress(CrgameError):
             if isinstance(step, Questions):
-                scale = load_questionnaire(questionnaire_name(study, step))
+                scale = scale_of(study, step)
                 scales[scale.name] = {question.name: question for question in scale.questions}
     for scale_name, questions in scales.items():
         for question in questions.values():

@@ -9,12 +9,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.study.answer_condition import Exclusion
 from crgame_ros.study.file import Block, Questions, StudyFile
 from crgame_ros.study.question import Answer, asked_of, Question
-from crgame_ros.study.questionnaire import (
-    load_questionnaire,
-    questionnaire_name,
-    questionnaire_of,
-    questions_of,
-)
+from crgame_ros.study.questionnaire import questionnaire_of, questions_of, scale_of
 from crgame_ros.study.session_journal import done_items, JournalEntry, SessionEvent
 from crgame_ros.study.session_script import Fields, SessionItem
 from crgame_ros.study.staircase import ToldTrial, Track
@@ -43,7 +38,7 @@ def judging_question(study: StudyFile, block: Block) -> tuple[int, Question] | N
     for number, entry in enumerate(block.after_trial):
         if not isinstance(entry.step, Questions) or entry.groups:
             continue
-        scale = load_questionnaire(questionnaire_name(study, entry.step))
+        scale = scale_of(study, entry.step)
         if success.questionnaire in (None, scale.name):
             always = [question for question in scale.questions if question.when is None]
             known += [question.name for question in always]

@@ -220,16 +220,19 @@ def consent_of(study: StudyFile, page: Page, language: str) -> dict[str, str]:
             'sha256': hashlib.sha256(content).hexdigest(), 'language': language}
 
 
-def questionnaire_name(study: StudyFile, step: Questions) -> str:
-    """Return a questionnaire's name, or the absolute path of its file."""
+def scale_of(study: StudyFile, step: Questions) -> Questionnaire:
+    """
+    Return the questionnaire of a step: a standard one, or that of a file beside the study's.
+
+    :raises InputError: naming the file, the key and the remedy.
+    """
     is_file = step.name.endswith(('.yaml', '.yml'))
-    return str(study.base / step.name) if is_file else step.name
+    return load_questionnaire(str(study.base / step.name) if is_file else step.name)
 
 
 def questionnaire_of(study: StudyFile, item: SessionItem) -> Questionnaire | None:
     """Return the questionnaire of an item; None without one."""
-    return load_questionnaire(questionnaire_name(study, item.what)) \
-        if isinstance(item.what, Questions) else None
+    return scale_of(study, item.what) if isinstance(item.what, Questions) else None
 
 
 def questions_of(study: StudyFile, item: SessionItem) -> tuple[Question, ...]:

@@ -14,7 +14,7 @@ from crgame_ros.study.data.study_row_table import (
 )
 from crgame_ros.study.file import Questions, StudyFile
 from crgame_ros.study.question import Answer
-from crgame_ros.study.questionnaire import load_questionnaire, Questionnaire, questionnaire_name
+from crgame_ros.study.questionnaire import Questionnaire, scale_of
 from crgame_ros.study.session_script import session_of, SessionItem
 
 
@@ -61,7 +61,7 @@ class AskedQuestions:
         self._by_item: dict[str, AskedScale] = {}
         # All participants answer the same questions, independent of the order of their trials.
         for item, step, before in _questions(study):
-            scale = load_questionnaire(questionnaire_name(study, step))
+            scale = scale_of(study, step)
             place = '' if item.trial is not None else f'{plain_name(_place(item.id))}_'
             known = self.after_trials if item.trial is not None else self.else_where
             prefix = f'{place}{scale.name}_'

@@ -23,7 +23,7 @@ from crgame_ros.study.question import (
     TextQuestion,
     VasQuestion,
 )
-from crgame_ros.study.questionnaire import load_questionnaire, questionnaire_name
+from crgame_ros.study.questionnaire import scale_of
 from crgame_ros.study.session_journal import DECLINED, how_ended, JournalEntry, SessionEvent
 from crgame_ros.study.session_script import Fields, PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
@@ -105,7 +105,7 @@ def _item(desk: Desk, item: SessionItem) -> dict[str, object]:
         if isinstance(what, Fields) or question.when is None or question.when.field is None
         or holds_for(question.when, {}, desk.session.fields)]}
     if isinstance(what, Questions):
-        scale = load_questionnaire(questionnaire_name(study, what))
+        scale = scale_of(study, what)
         questions |= {'title': scale.title.in_language(language),
                       'text': scale.text.in_language(language), 'matrix': scale.matrix}
     assert isinstance(what, Questions | Fields)
