@@ -3,7 +3,7 @@
 """Checks a study before its first session: missing files, balance, and drivable conditions."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise, product
@@ -152,8 +152,9 @@ def _try(settings: TrialSettings) -> set[str]:
 
 
 def _steps(study: StudyFile) -> Iterator[StudyFinding]:
-    for name, texts in _texts(study):
-        yield from _untold(study, name, texts)
+    yield from _untold(study, 'title', (study.title,))
+    for question in study.fields:
+        yield from _untold(study, f'fields: {question.name}', question.texts)
     # A questionnaire that comes after several trials is one finding.
     for step in dict.fromkeys(steps_of(study)):
         if isinstance(step, Page):
@@ -183,15 +184,9 @@ def _page(study: StudyFile, page: Page) -> Iterator[StudyFinding]:
                                           f'{file.with_suffix(f".{language}.md").name}')
 
 
-def _texts(study: StudyFile) -> Iterator[tuple[str, tuple[LocalText, ...]]]:
-    yield 'title', (study.title,)
-    for question in study.fields:
-        yield f'fields: {question.name}', question.texts
-
-
-def _untold(study: StudyFile, name: str, texts: Iterable[LocalText]) -> Iterator[StudyFinding]:
+def _untold(study: StudyFile, name: str,
+            texts: tuple[LocalText, ...]) -> Iterator[StudyFinding]:
     """Yield the languages in which some text is missing, so that another language is shown."""
-    texts = tuple(texts)
     for language in study.all_languages:
         if any(text.lacks(language) for text in texts):
             yield StudyFinding('warning', f'{name}: has no texts in "{language}"')
@@ -290,12 +285,11 @@ def _balance(study: StudyFile) -> Iterator[StudyFinding]:
                                       f'{len(groups)} groups of equal size')
     for group in groups if len(study.blocks) > 1 and (
             study.block_order != 'given' or study.block_sequences) else ():
-        yield from _unbalanced(_Ordered(
-            f'blocks in {group}' if group else 'blocks', 'block', len(study.blocks), 'block_order',
-            '' if study.block_sequences else study.block_order, block_rows(study),
-            len(study.blocks)),
-            [[block.name for block in blocks_of(study, place, group)]
-             for place in range(places)])
+        yield from _unbalanced(
+            f'blocks in {group}' if group else 'blocks', 'block', len(study.blocks),
+            [[block.name for block in blocks_of(study, place, group)] for place in range(places)],
+            len(study.blocks), 'block_order',
+            '' if study.block_sequences else study.block_order, block_rows(study))
     for block, group in product(study.blocks, groups):
         if block.staircase is not None:
             continue
@@ -307,50 +301,35 @@ def _balance(study: StudyFile) -> Iterator[StudyFinding]:
             continue
         conditions = len(conditions_of(study, block))
         if conditions > 1:
-            yield from _unbalanced(_Ordered(
+            yield from _unbalanced(
                 f'{block.name} in {group}' if group else block.name, 'condition', conditions,
-                'order', '' if block.sequences else block.order,
-                block_rows(study) * rows_of(block.order, conditions),
-                len(block.sequences[0]) if block.sequences else conditions), orders)
+                orders, len(block.sequences[0]) if block.sequences else conditions, 'order',
+                '' if block.sequences else block.order,
+                block_rows(study) * rows_of(block.order, conditions))
 
 
-@dataclass(frozen=True)
-class _Ordered:
+def _unbalanced(name: str, noun: str, count: int, orders: list[list[str]], length: int, key: str,
+                kind: str, rows: int) -> Iterator[StudyFinding]:
     """
-    What is ordered for each participant.
+    Yield how the orders of conditions or blocks are not balanced over participants.
 
-    :param name: for findings.
     :param noun: of one: condition or block.
     :param count: number of them.
+    :param orders: of each participant, in repetitions of one `length`.
     :param key: of the order in the file.
     :param kind: of the order; empty for sequences of the file.
     :param rows: multiples of so many participants are balanced.
-    :param length: of each repetition.
     """
-
-    name: str
-    noun: str
-    count: int
-    key: str
-    kind: str
-    rows: int
-    length: int
-
-
-def _unbalanced(what: _Ordered, orders: list[list[str]]) -> Iterator[StudyFinding]:
     first = Counter(order[0] for order in orders)
-    if len(first) < what.count or len(set(first.values())) > 1:
-        mend = f'take a multiple of {what.rows} participants' if what.kind == 'williams' \
-            else f'take "{what.key}: williams"'
-        yield StudyFinding('warning', f'{what.name}: with {len(orders)} participants not '
-                                      f'every {what.noun} is first equally often; {mend}')
-    follows = Counter(pair for order in orders for pair in _within(order, what.length))
-    if len(follows) < what.count * (what.count - 1) or len(set(follows.values())) > 1:
-        yield StudyFinding('warning', f'{what.name}: not every {what.noun} follows every other '
-                                      'equally often')
-
-
-def _within(order: list[str], length: int) -> Iterable[tuple[str, str]]:
-    """Yield the pairs of successive conditions that differ, within each repetition."""
-    for start in range(0, len(order), length):
-        yield from (pair for pair in pairwise(order[start:start + length]) if len(set(pair)) > 1)
+    if len(first) < count or len(set(first.values())) > 1:
+        mend = f'take a multiple of {rows} participants' if kind == 'williams' \
+            else f'take "{key}: williams"'
+        yield StudyFinding('warning', f'{name}: with {len(orders)} participants not every {noun} '
+                                      f'is first equally often; {mend}')
+    # Of successive ones that differ, within each repetition.
+    follows = Counter(
+        pair for order in orders for start in range(0, len(order), length)
+        for pair in pairwise(order[start:start + length]) if pair[0] != pair[1])
+    if len(follows) < count * (count - 1) or len(set(follows.values())) > 1:
+        yield StudyFinding('warning', f'{name}: not every {noun} follows every other equally '
+                                      'often')
