@@ -348,9 +348,10 @@ class StudyFile:
         return any(block.judged is not None for block in self.blocks)
 
     @property
-    def has_staircases(self) -> bool:
-        """Return whether a block has a staircase."""
-        return any(block.staircase is not None for block in self.blocks)
+    def staircases(self) -> dict[str, Staircase]:
+        """Return the staircases by the names of their blocks."""
+        return {block.name: block.staircase for block in self.blocks
+                if block.staircase is not None}
 
     @property
     def all_factors(self) -> tuple[Factor, ...]:

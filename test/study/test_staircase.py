@@ -499,5 +499,5 @@ def test_a_withdrawn_participant_leaves_the_staircases(made: Path) -> None:
     rows = polars.read_parquet(made / 'data' / 'staircases.parquet')
     assert set(rows['participant']) == {'P01', 'P03'}
     study = ConductedStudy(made)
-    assert load_study(study.study_path).has_staircases
+    assert load_study(study.study_path).staircases
     assert all(record.complete for record in study.participants())

@@ -211,7 +211,7 @@ class PlannedTest:
 def used_rows(study: StudyFile,
               rows: Iterable[Mapping[str, object]]) -> list[Mapping[str, object]]:
     """Return the trials that the planned analysis uses: none of staircases."""
-    stepped = {block.name for block in study.blocks if block.staircase is not None}
+    stepped = study.staircases
     flags = () if study.analysis.flagged == 'use' else FLAGS
     return [row for row in rows if row.get('block') not in stepped
             and not any(row.get(flag) for flag in flags)]

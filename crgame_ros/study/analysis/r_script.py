@@ -77,11 +77,10 @@ def r_script(study: StudyFile, columns: Mapping[str, str]) -> str:
     flagged = '' if analysis.flagged == 'use' else (
         '# Trials beyond a bound of quality are left out.\n'
         f'trials <- trials[!({" | ".join(f"trials${flag} %in% TRUE" for flag in FLAGS)}), ]\n')
-    stepped = [block.name for block in study.blocks if block.staircase is not None]
-    if stepped:
+    if study.staircases:
         flagged += ('# Of staircases, answers choose the levels of the trials.\n'
-                    f'trials <- trials[!(trials$block %in% c({", ".join(map(_text, stepped))})), '
-                    ']\n')
+                    'trials <- trials[!(trials$block %in% '
+                    f'c({", ".join(map(_text, study.staircases))})), ]\n')
     # Both kinds of tests are rows of one table.
     more = '' if study.groups is None else ', d_s = NA, g_s = NA'
     # Levels such as 01 and T are texts.

@@ -48,8 +48,7 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
                        _plain(write(condition.settings))
                        for group in study.group_names for block in study.blocks
                        for condition in conditions_of(study, block, group)},
-        'staircases': {block.name: block.staircase.told for block in study.blocks
-                       if block.staircase is not None},
+        'staircases': {block: staircase.told for block, staircase in study.staircases.items()},
         'random_seeds': sorted({row['random_seed'] for row in rows
                                 if row.get('random_seed') is not None}),
         'questionnaires': [{

@@ -282,7 +282,7 @@ def method_of(study: StudyFile) -> str:
     flagged = 'Trials beyond a bound of quality are used.' if analysis.flagged == 'use' \
         else 'Trials beyond a bound of quality (timing_flag, page_flag) are left out.'
     stepped = ' Trials of staircases are left out: answers choose their levels.' \
-        if study.has_staircases else ''
+        if study.staircases else ''
     between = '' if all(each.factor != study.between for each in analysis.comparisons) else (
         'Between groups, a participant’s value is the mean over all its trials; test and interval '
         'are those of Welch, with Satterthwaite’s degrees of freedom, beside the test of Mann and '

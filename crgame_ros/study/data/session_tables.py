@@ -163,10 +163,9 @@ def counted_tracks(record: ParticipantRecord) -> Mapping[tuple[str, str], Track]
 
 def staircase_rows(record: ParticipantRecord) -> Iterator[dict[str, object]]:
     """Yield the rows of a participant."""
-    blocks = {block.name: block.staircase for block in record.study.blocks}
+    staircases = record.study.staircases
     for (block, name), track in counted_tracks(record).items():
-        staircase = blocks[block]
-        assert staircase is not None
+        staircase = staircases[block]
         yield {'participant': record.id, 'block': block, 'staircase': name,
                'factor': staircase.factor, 'rule': staircase.rule, **_results(track)}
 

@@ -304,7 +304,7 @@ class StudyData:
         """Return the declarations of the tables, in their order."""
         return (self.trials_table.declaration, self.people_table.declaration, ANSWERS,
                 EVENTS_OF_SESSIONS,
-                *((STAIRCASES,) if self.folder.study.has_staircases else ()))
+                *((STAIRCASES,) if self.folder.study.staircases else ()))
 
     @property
     def factor_columns(self) -> dict[str, str]:
@@ -358,7 +358,7 @@ def read_study_data(folder: ConductedStudy, say: Callable[[str], object],
             people.row(record) for record in records)),
         'answers': table_of_rows(ANSWERS, _answers(data)),
         'events': table_of_rows(EVENTS_OF_SESSIONS, events)}
-    if folder.study.has_staircases:
+    if folder.study.staircases:
         data.tables[STAIRCASES.name] = table_of_rows(STAIRCASES, (
             row for record in records for row in staircase_rows(record)))
     return data

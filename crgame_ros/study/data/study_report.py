@@ -82,7 +82,7 @@ def study_html(data: StudyData) -> str:
         *([Section('planned', 'Planned comparisons', _planned_section(data))]
           if study.analysis.comparisons else ()),
         *([Section('staircases', 'Staircases', _staircase_section(data))]
-          if study.has_staircases else ()),
+          if study.staircases else ()),
         Section('people', 'Who took part', _flow_table(data) + _people(data)),
         Section('troubles', 'Left out, aborted, repeated', _troubles(data)),
         Section('timing', 'Timing of each trial', _timing(data)),
@@ -228,9 +228,8 @@ def _flow_table(data: StudyData) -> str:
 
 def _staircase_section(data: StudyData) -> str:
     """Return the section."""
-    rules = {block.name: block.staircase.told for block in data.folder.study.blocks
-             if block.staircase is not None}
-    html = note('; '.join(f'{free(name)}: {plain(told)}' for name, told in rules.items()) + '.')
+    html = note('; '.join(f'{free(block)}: {plain(staircase.told)}' for block, staircase
+                          in data.folder.study.staircases.items()) + '.')
     rows = [(free(row['participant']), free(row['block']), free(row['staircase']),
              number(row['threshold'], 3), number(row['threshold_sd'], 3),
              f'{row["reversals_used"]} of {row["reversals"]}', str(row['trials']),

@@ -171,7 +171,7 @@ def declare_trials(study: StudyFile,
     runs = {column.name: column for column in RUNS.columns}
     fixed = [*_DRIVE, *(runs[name] for name in _RUN_COLUMNS), *_TIMING,
              *measure_columns().values(), *TASK_COLUMNS, _ANSWERED]
-    stepped = STAIRCASE_COLUMNS if study.has_staircases else ()
+    stepped = STAIRCASE_COLUMNS if study.staircases else ()
     taken = {column.name for column in (*_FIRST, PLACE_IN_GROUP, *stepped, *fixed)}
     factors: dict[str, Column] = {}
     for factor in study.all_factors:
