@@ -374,6 +374,10 @@ class StudyFile:
             return NOTHING
         return next(level.settings for level in self.groups.levels if level.name == group)
 
+    def title_in(self, language: str) -> str:
+        """Return the title in a language; the name of a study without one."""
+        return self.title.in_language(language) or self.name
+
     @property
     def all_languages(self) -> tuple[str, ...]:
         """Return the languages that participants can choose, that of the study first."""

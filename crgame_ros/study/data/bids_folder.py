@@ -203,8 +203,7 @@ def write_bids(data: StudyData, out: Path) -> None:
     task = _label(data.folder.study.name) or 'study'
     prepare_folder(out)
     _remove_earlier(out, task)
-    title = data.folder.study.title.in_language(data.folder.study.language) \
-        or data.folder.study.name
+    title = data.folder.study.title_in(data.folder.study.language)
     _json(out / 'dataset_description.json', {
         'Name': title, 'BIDSVersion': VERSION, 'DatasetType': 'raw',
         'GeneratedBy': [{'Name': 'crgame_ros', 'Version': __version__}]})

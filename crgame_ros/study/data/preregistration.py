@@ -113,9 +113,9 @@ def preregistration_of(study: StudyFile, files: Mapping[str, str],
     factors, declaration = declare_trials(study, AskedQuestions(study))
     check_measures(study, declaration.columns)
     columns = {name: column.name for name, column in factors.items()}
-    title = study.title.in_language(study.language) or study.name
-    lines = [f'# Preregistration: {title}', '', f'Study `{study.name}`, planned with crgame_ros.',
-             '', *_design(study), *_orders(study), *_measures(study, declaration.columns),
+    lines = [f'# Preregistration: {study.title_in(study.language)}', '',
+             f'Study `{study.name}`, planned with crgame_ros.', '',
+             *_design(study), *_orders(study), *_measures(study, declaration.columns),
              *_exclusion(study), *_analysis(study, columns), *_power(power), *_versions(study),
              _FILES, '', 'The files of the study and what its games name, with their SHA-256:', '',
              '```', *(f'{digest}  {name}' for name, digest in sorted(files.items())), '```', '']

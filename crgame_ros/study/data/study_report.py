@@ -74,7 +74,7 @@ def write_study_report(data: StudyData, path: Path) -> None:
 def study_html(data: StudyData) -> str:
     """Return the page as HTML."""
     study = data.folder.study
-    title = study.title.in_language(study.language) or study.name
+    title = study.title_in(study.language)
     if data.made:
         title = f'Made data: {title}'
     sections = [

@@ -172,7 +172,7 @@ def consent_copy(study: StudyFile, page: Page, language: str, participant: str, 
     """
     told = consent_of(study, page, language)
     day = datetime.fromtimestamp(at_s, UTC).date().isoformat()
-    title = study.title.in_language(language) or study.name
+    title = study.title_in(language)
     values = {**told, 'study': title, 'date': day, 'participant': participant}
     facts = [_filled(words[key], values) for key in (
         'copy_of', *(('copy_version',) if told['version'] else ()), 'copy_digest', 'copy_id')]

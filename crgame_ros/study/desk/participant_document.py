@@ -45,7 +45,7 @@ def participant_document(desk: Desk) -> dict[str, object]:
     session, language = desk.session, desk.language
     item = session.next_item
     document = {
-        'study': session.study.title.in_language(language) or session.study.name,
+        'study': session.study.title_in(language),
         'participant': session.participant, 'language': language,
         'languages': list(session.study.all_languages), 'item': '' if item is None else item.id,
         'again': 0 if item is None else session.repeats(item.id),
@@ -183,7 +183,7 @@ def experimenter_document(desk: Desk, page: Mapping[str, object]) -> dict[str, o
     session, state = desk.session, desk.drives.state
     item = session.next_item
     return {
-        'study': session.study.title.in_language(session.study.language) or session.study.name,
+        'study': session.study.title_in(session.study.language),
         'name': session.study.name, 'participant': session.participant, 'place': session.place,
         'group': None if session.allocation is None else session.allocation.group,
         'partners': [partner.participant for partner in session.partners],
