@@ -52,7 +52,7 @@ class Comparison:
         """Return the compared pairs of levels: the contrast, or all pairs."""
         if self.contrast is not None:
             return ((self.contrast[0], self.contrast[1]),)
-        return tuple(combinations([level.name for level in factor.levels], 2))
+        return tuple(combinations(factor.names, 2))
 
     def check_levels(self, factor: Factor, where: str) -> None:
         """
@@ -60,11 +60,10 @@ class Comparison:
 
         :raises InputError: if the comparison does not fit the factor.
         """
-        names = [level.name for level in factor.levels]
         for name in self.contrast or ():
-            if name not in names:
+            if name not in factor.names:
                 raise InputError(f'names "{name}", which is no level of {factor.name}',
-                                 f'{where}: contrast', f'name {", ".join(names)}')
+                                 f'{where}: contrast', f'name {", ".join(factor.names)}')
         if self.contrast is not None and self.contrast[0] == self.contrast[1]:
             raise InputError('compares a level with itself', f'{where}: contrast',
                              'name two levels')

@@ -145,12 +145,11 @@ class Staircase:
             raise InputError(f'names "{self.factor}", which is no factor of the block',
                              f'{where}: staircase: factor',
                              f'name {", ".join(each.name for each in factors) or "a factor"}')
-        names = [level.name for level in factor.levels]
-        if self.start is not None and self.start not in names:
+        if self.start is not None and self.start not in factor.names:
             raise InputError(f'names "{self.start}", which is no level of {factor.name}',
-                             f'{where}: staircase: start', f'name {", ".join(names)}')
-        if self.values and len(self.values) != len(names):
-            raise InputError(f'has {len(self.values)} numbers for {len(names)} levels',
+                             f'{where}: staircase: start', f'name {", ".join(factor.names)}')
+        if self.values and len(self.values) != len(factor.levels):
+            raise InputError(f'has {len(self.values)} numbers for {len(factor.levels)} levels',
                              f'{where}: staircase: values', 'give one for each level')
         signs = {(after > before) - (after < before)
                  for before, after in pairwise(self.numbers_of(factor))}
@@ -162,14 +161,13 @@ class Staircase:
         """Return the numbers of the levels."""
         if self.values:
             return self.values
-        names = [level.name for level in factor.levels]
-        return tuple(map(float, names)) if all(name.isdecimal() for name in names) \
-            else tuple(float(number + 1) for number in range(len(names)))
+        if all(name.isdecimal() for name in factor.names):
+            return tuple(map(float, factor.names))
+        return tuple(float(number + 1) for number in range(len(factor.levels)))
 
     def start_of(self, factor: Factor) -> int:
         """Return the index of the first level."""
-        return 0 if self.start is None else [level.name for level in factor.levels].index(
-            self.start)
+        return 0 if self.start is None else factor.names.index(self.start)
 
     @property
     def down(self) -> int:

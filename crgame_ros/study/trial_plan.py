@@ -83,7 +83,7 @@ class BlockStaircases:
         self._study, self._block, self._group = study, block, group
         self._staircase, name = block.staircase, block.staircase.factor
         self.factor: Factor = next(each for each in study.factors if each.name == name)
-        steps = [level.name for level in self.factor.levels]
+        steps = self.factor.names
         whose: dict[str, int] = {}
         self._conditions: dict[tuple[int, int], Condition] = {}
         for condition in conditions_of(study, block, group):

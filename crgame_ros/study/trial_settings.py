@@ -148,6 +148,11 @@ class Factor:
     name: ColumnName
     levels: Annotated[tuple[Level, ...], Listed(2, 50, 'level', 'name')]
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the levels."""
+        return tuple(level.name for level in self.levels)
+
 
 def drawn(settings: TrialSettings, drive: str) -> TrialSettings:
     """

@@ -123,7 +123,7 @@ def _model(formula: ModelFormula, columns: Mapping[str, str]) -> str:
              f'is.finite(trials[[{_text(formula.measure)}]]), ]']
     for factor in formula.factors:
         name = _text(columns[factor.name])
-        levels = ', '.join(_text(level.name) for level in factor.levels)
+        levels = ', '.join(map(_text, factor.names))
         lines.append(f'used[[{name}]] <- factor(used[[{name}]], levels = c({levels}))')
     terms = ' + '.join(f'`{columns[factor.name]}`' for factor in formula.factors)
     lines += [f'model <- lmer(`{formula.measure}` ~ {terms} + (1 | participant), data = used, '

@@ -132,7 +132,7 @@ def _design(study: StudyFile) -> Iterator[str]:
                     f'seed {study.seed}.', '')
     if study.factors:
         yield from ('| factor | levels |', '|---|---|')
-        yield from (f'| {factor.name} | {", ".join(level.name for level in factor.levels)} |'
+        yield from (f'| {factor.name} | {", ".join(factor.names)} |'
                     for factor in study.factors)
         yield ''
     yield from ('| block | factors | repetitions | order |', '|---|---|---|---|')

@@ -180,7 +180,7 @@ def declare_trials(study: StudyFile,
         factors[factor.name] = Column(
             name, TEXT, '', f'level of the factor {factor.name}', empty='its block does not '
             'cross it', variant=_between(study, factor),
-            values=tuple(level.name for level in factor.levels))
+            values=factor.names)
     answers = [column for scale in asked.after_trials.values()
                for column in scale.columns(study.language)]
     return factors, TableDeclaration(
