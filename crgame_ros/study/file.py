@@ -16,7 +16,7 @@ from crgame_ros.study.answer_condition import Exclusion
 from crgame_ros.study.elsewhere import Elsewhere
 from crgame_ros.study.groups import Groups
 from crgame_ros.study.local_text import BESIDE, LocalText, Name, Text
-from crgame_ros.study.planned_analysis import PlannedAnalysis
+from crgame_ros.study.planned_analysis import Comparison, PlannedAnalysis
 from crgame_ros.study.quality import QualityBounds
 from crgame_ros.study.question import check_conditions, Question
 from crgame_ros.study.staircase import Staircase, StopRule, Success
@@ -357,6 +357,11 @@ class StudyFile:
     def all_factors(self) -> tuple[Factor, ...]:
         """Return the factors within participants, and the one between them."""
         return (*self.factors, *((self.groups.factor,) if self.groups is not None else ()))
+
+    def pairs_of(self, comparison: Comparison) -> tuple[tuple[str, str], ...]:
+        """Return the pairs of levels, or groups, that a planned comparison compares."""
+        return comparison.pairs(next(factor for factor in self.all_factors
+                                     if factor.name == comparison.factor))
 
     @property
     def between(self) -> str | None:

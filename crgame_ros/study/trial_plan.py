@@ -28,7 +28,12 @@ class Condition:
     @property
     def name(self) -> str:
         """Return its name, made of its levels."""
-        return '/'.join(level.name for _, level in self.levels) or 'all'
+        return '/'.join(self.level_names.values()) or 'all'
+
+    @property
+    def level_names(self) -> dict[str, str]:
+        """Return the names of its levels, by those of the factors."""
+        return {factor: level.name for factor, level in self.levels}
 
 
 @dataclass(frozen=True)
@@ -90,7 +95,7 @@ class BlockStaircases:
             others = replace(condition, levels=tuple(
                 each for each in condition.levels if each[0] != name))
             index = whose.setdefault(others.name, len(whose))
-            self._conditions[index, steps.index(dict(condition.levels)[name].name)] = condition
+            self._conditions[index, steps.index(condition.level_names[name])] = condition
         self.names = tuple(whose)
         self._places = {each.name: at for at, each in self._conditions.items()}
 

@@ -261,13 +261,12 @@ def planned_tests(study: StudyFile, rows: Sequence[Mapping[str, object]],
     :param rows: of the table of trials.
     :param columns: of the factors, by their names.
     """
-    factors = {factor.name: factor for factor in study.all_factors}
     rows = used_rows(study, rows)
     alpha = study.analysis.alpha
     found: list[tuple[Comparison, tuple[str, str], PairedTest | UnpairedTest]] = []
     for comparison in study.analysis.comparisons:
         means = level_means(rows, columns[comparison.factor], comparison.measure)
-        for pair in comparison.pairs(factors[comparison.factor]):
+        for pair in study.pairs_of(comparison):
             first, second = (means.get(level, {}) for level in pair)
             if comparison.factor == study.between:
                 found.append((comparison, pair, unpaired_test(

@@ -185,7 +185,7 @@ def measure_models(study: StudyFile, effects: bool = True) -> dict[str, MeasureM
         stated: dict[tuple[str, str], tuple[str, float]] = {}
         for number, each in of_measure if effects else ():
             if each.effect is not None:
-                first, second = _pair(study, each)
+                first, second = study.pairs_of(each)[0]
                 unit = 1.0 if each.sd is not None else group_sd \
                     if each.factor == study.between else trial_sd * _root(study, each, trials)
                 effect = first, each.effect * unit
@@ -247,17 +247,8 @@ def _trial_sd(study: StudyFile, comparison: Comparison,
 
 def _root(study: StudyFile, comparison: Comparison, trials: tuple[PlannedTrial, ...]) -> float:
     """Return the standard deviation of a difference of means over that of a trial."""
-    counts = Counter(dict(_levels(trial)).get(comparison.factor) for trial in trials)
-    return math.sqrt(sum(1.0 / max(1, counts[level]) for level in _pair(study, comparison)))
-
-
-def _pair(study: StudyFile, comparison: Comparison) -> tuple[str, str]:
-    return comparison.pairs(next(factor for factor in study.all_factors
-                                 if factor.name == comparison.factor))[0]
-
-
-def _levels(trial: PlannedTrial) -> tuple[tuple[str, str], ...]:
-    return tuple((factor, level.name) for factor, level in trial.condition.levels)
+    counts = Counter(trial.condition.level_names.get(comparison.factor) for trial in trials)
+    return math.sqrt(sum(1.0 / max(1, counts[level]) for level in study.pairs_of(comparison)[0]))
 
 
 class SimulatedTrials:
@@ -275,16 +266,21 @@ class SimulatedTrials:
                  models: dict[str, MeasureModel]) -> None:
         self._models = models
         self.measures = tuple(models)
-        planned = [(number, _grouped(study, person, trial)) for number, person in enumerate(people)
-                   for trial in _compared_trials(study, person.place, person.group)]
-        self.rows: list[dict[str, object]] = [
-            {'participant': people[number].id, 'trial': trial.number, 'block': trial.block,
-             **levels} for number, (trial, levels) in planned]
-        self._people = np.array([number for number, _ in planned], dtype=np.intp)
+        self.rows: list[dict[str, object]] = []
+        levels: list[dict[str, str]] = []
+        numbers: list[int] = []
+        for number, person in enumerate(people):
+            own = {} if study.between is None else {study.between: person.group}
+            for trial in _compared_trials(study, person.place, person.group):
+                numbers.append(number)
+                levels.append(trial.condition.level_names | own)
+                self.rows.append({'participant': person.id, 'trial': trial.number,
+                                  'block': trial.block, **levels[-1]})
+        self._people = np.array(numbers, dtype=np.intp)
         self._count = len(people)
         self._fixed = {measure: np.array([
-            sum(model.effects.get(level, 0.0) for level in levels.items())
-            for _, (_, levels) in planned]) for measure, model in models.items()}
+            sum(model.effects.get(level, 0.0) for level in each.items()) for each in levels])
+            for measure, model in models.items()}
 
     def draw(self, rng: np.random.Generator) -> list[dict[str, object]]:
         """Draw all measures of all trials; return the rows, which the next draw overwrites."""
@@ -295,10 +291,3 @@ class SimulatedTrials:
             for row, value in zip(self.rows, values.tolist(), strict=True):
                 row[measure] = value
         return self.rows
-
-
-def _grouped(study: StudyFile, person: SimulatedPerson,
-             trial: PlannedTrial) -> tuple[PlannedTrial, dict[str, str]]:
-    """Return a trial with its levels by factor, that of the group among them."""
-    between = {} if study.between is None else {study.between: person.group}
-    return trial, {**dict(_levels(trial)), **between}

@@ -96,9 +96,7 @@ def r_script(study: StudyFile, columns: Mapping[str, str]) -> str:
 
 
 def _tests(study: StudyFile, columns: Mapping[str, str]) -> Iterator[str]:
-    factors = {factor.name: factor for factor in study.all_factors}
-    groups = [[_call(study, comparison, pair, columns)
-               for pair in comparison.pairs(factors[comparison.factor])]
+    groups = [[_call(study, comparison, pair, columns) for pair in study.pairs_of(comparison)]
               for comparison in study.analysis.comparisons]
     if study.analysis.family == 'analysis':
         groups = [[call for group in groups for call in group]]

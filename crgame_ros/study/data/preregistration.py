@@ -215,11 +215,10 @@ def _analysis(study: StudyFile, columns: Mapping[str, str]) -> Iterator[str]:
     if not study.analysis.comparisons:
         yield from ('No comparison is planned.', '')
         return
-    factors = {factor.name: factor for factor in study.all_factors}
     yield from ('| measure | factor | difference | hypothesis | expected |',
                 '|---|---|---|---|---|')
     for each in study.analysis.comparisons:
-        for first, second in each.pairs(factors[each.factor]):
+        for first, second in study.pairs_of(each):
             hypothesis = {'two-sided': '≠ 0', 'greater': '> 0', 'less': '< 0'}[each.alternative]
             expected = 'not stated' if each.effect is None else \
                 f'{each.effect:g}, standard deviation {each.sd:g} (in a group)' \
