@@ -3,96 +3,12 @@
 """The bounds beyond which the data of a trial do not hold, and what happens then."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
 
 from crgame_ros.schema.marks import Within
 
 Bound = Annotated[float, Within(0.0)] | None
-
-
-@dataclass(frozen=True)
-class QualityBounds:
-    """
-    The bounds of a trial's data; null does not check.
-
-    :param max_cumulative_error_s: greatest cumulative error of the timing, at most [s]
-    :param timeout_ratio: share of cycles that took longer than a step, at most.
-    :param real_time_ratio_final: simulated over wall time of the whole run, at least.
-    :param resets: drift resets, at most.
-    :param gaps: cycles that were not recorded, at most.
-    :param input_delay_s: median delay from the hand to the answer at the page, at most [s]
-    :param plans_of_others: plans of other programs than the AVs' planners, at most.
-    :param link_delay_s: median round trip from the page to the simulation and back, at most; the
-        first drive does not begin as long as that to the study's page is longer [s]
-    :param view_rate_hz: pictures a second at the page, median, at least [Hz]
-    :param unseen_stimuli: stimuli and requests that the page has not shown, at most.
-    :param away_s: time for which the page was hidden or without the focus, at most [s]
-    :param windowed_s: time for which the page did not fill the screen, at most [s]
-    :param device_changes: changes of the input device, at most.
-    :param beyond: `mark` counts such a drive and marks it; `repeat` drives it again, as a drive
-        that was aborted; `stop` counts it, and holds the session until the experimenter goes on.
-        Both judge what is known when a drive ends: all but gaps, input_delay_s, plans_of_others.
-    :param repeats: how often `repeat` repeats a drive, before it is marked.
-    """
-
-    max_cumulative_error_s: Bound = 0.1
-    timeout_ratio: Bound = 0.01
-    real_time_ratio_final: Bound = 0.99
-    resets: Bound = 0.0
-    gaps: Bound = 0.0
-    input_delay_s: Bound = 0.1
-    plans_of_others: Bound = 0.0
-    link_delay_s: Bound = 0.15
-    view_rate_hz: Bound = 20.0
-    unseen_stimuli: Bound = 0.0
-    away_s: Bound = 0.5
-    windowed_s: Bound = None
-    device_changes: Bound = 0.0
-    beyond: Literal['mark', 'repeat', 'stop'] = 'mark'
-    repeats: Annotated[int, Within(1, 20)] = 2
-
-    def as_dict(self) -> dict[str, object]:
-        """Return their JSON form."""
-        return asdict(self)
-
-    def excesses(self, values: Mapping[str, object], names: Mapping[str, 'Check']
-                 ) -> list['Excess']:
-        """
-        Return the values of a trial that are beyond their bounds.
-
-        :param values: by the bounds' names; missing ones are not checked.
-        :param names: the checks.
-        """
-        found = []
-        for name, check in names.items():
-            value, bound = values.get(name), getattr(self, name)
-            if isinstance(value, int | float) and bound is not None and (
-                    value < bound if check.least else value > bound):
-                found.append(Excess(name, check, value, bound))
-        return found
-
-    def faults(self, values: Mapping[str, object], names: Mapping[str, 'Check']) -> list[str]:
-        """Return `excesses` as texts, one for each."""
-        return [str(excess) for excess in self.excesses(values, names)]
-
-    def next_step(self, doubts: Sequence['Excess'], repeats: int
-                  ) -> Literal['count', 'repeat', 'stop']:
-        """
-        Return what becomes of a drive that has ended.
-
-        :param doubts: `excesses` of its values.
-        :param repeats: how often it came again because of its data.
-        """
-        if not doubts or self.beyond == 'mark' or (
-                self.beyond == 'repeat' and repeats >= self.repeats):
-            return 'count'
-        return self.beyond
-
-    def told(self) -> list[tuple[str, str]]:
-        """Return each bound as text: its quantity and its value."""
-        return [(check.words, 'not checked' if (bound := getattr(self, name)) is None
-                 else check.bound(bound)) for name, check in {**TIMING, **PAGE}.items()]
 
 
 class Check(NamedTuple):
@@ -161,3 +77,84 @@ PAGE = {
     'away_s': Check('page hidden or without the focus', 's', digits=1),
     'windowed_s': Check('page not in full screen', 's', digits=1),
     'device_changes': Check('changes of the input device')}
+CHECKS = TIMING | PAGE
+
+
+@dataclass(frozen=True)
+class QualityBounds:
+    """
+    The bounds of a trial's data; null does not check.
+
+    :param max_cumulative_error_s: greatest cumulative error of the timing, at most [s]
+    :param timeout_ratio: share of cycles that took longer than a step, at most.
+    :param real_time_ratio_final: simulated over wall time of the whole run, at least.
+    :param resets: drift resets, at most.
+    :param gaps: cycles that were not recorded, at most.
+    :param input_delay_s: median delay from the hand to the answer at the page, at most [s]
+    :param plans_of_others: plans of other programs than the AVs' planners, at most.
+    :param link_delay_s: median round trip from the page to the simulation and back, at most; the
+        first drive does not begin as long as that to the study's page is longer [s]
+    :param view_rate_hz: pictures a second at the page, median, at least [Hz]
+    :param unseen_stimuli: stimuli and requests that the page has not shown, at most.
+    :param away_s: time for which the page was hidden or without the focus, at most [s]
+    :param windowed_s: time for which the page did not fill the screen, at most [s]
+    :param device_changes: changes of the input device, at most.
+    :param beyond: `mark` counts such a drive and marks it; `repeat` drives it again, as a drive
+        that was aborted; `stop` counts it, and holds the session until the experimenter goes on.
+        Both judge what is known when a drive ends: all but gaps, input_delay_s, plans_of_others.
+    :param repeats: how often `repeat` repeats a drive, before it is marked.
+    """
+
+    max_cumulative_error_s: Bound = 0.1
+    timeout_ratio: Bound = 0.01
+    real_time_ratio_final: Bound = 0.99
+    resets: Bound = 0.0
+    gaps: Bound = 0.0
+    input_delay_s: Bound = 0.1
+    plans_of_others: Bound = 0.0
+    link_delay_s: Bound = 0.15
+    view_rate_hz: Bound = 20.0
+    unseen_stimuli: Bound = 0.0
+    away_s: Bound = 0.5
+    windowed_s: Bound = None
+    device_changes: Bound = 0.0
+    beyond: Literal['mark', 'repeat', 'stop'] = 'mark'
+    repeats: Annotated[int, Within(1, 20)] = 2
+
+    def excesses(self, values: Mapping[str, object],
+                 checks: Mapping[str, Check] = CHECKS) -> list[Excess]:
+        """
+        Return the values of a trial that are beyond their bounds.
+
+        :param values: by the bounds' names; missing ones are not checked.
+        """
+        found = []
+        for name, check in checks.items():
+            value, bound = values.get(name), getattr(self, name)
+            if isinstance(value, int | float) and bound is not None and (
+                    value < bound if check.least else value > bound):
+                found.append(Excess(name, check, value, bound))
+        return found
+
+    def faults(self, values: Mapping[str, object],
+               checks: Mapping[str, Check] = CHECKS) -> list[str]:
+        """Return `excesses` as texts, one for each."""
+        return list(map(str, self.excesses(values, checks)))
+
+    def next_step(self, doubts: Sequence[Excess], repeats: int
+                  ) -> Literal['count', 'repeat', 'stop']:
+        """
+        Return what becomes of a drive that has ended.
+
+        :param doubts: `excesses` of its values.
+        :param repeats: how often it came again because of its data.
+        """
+        if not doubts or self.beyond == 'mark' or (
+                self.beyond == 'repeat' and repeats >= self.repeats):
+            return 'count'
+        return self.beyond
+
+    def told(self) -> list[tuple[str, str]]:
+        """Return each bound as text: its quantity and its value."""
+        return [(check.words, 'not checked' if (bound := getattr(self, name)) is None
+                 else check.bound(bound)) for name, check in CHECKS.items()]

@@ -14,7 +14,7 @@ from crgame_ros.study.desk.page_markdown import picture, read_tree
 from crgame_ros.study.desk.pages import languages_of, WORDS, words_of
 from crgame_ros.study.drive_watch import DrivePhase, DriveWork
 from crgame_ros.study.file import Page
-from crgame_ros.study.quality import PAGE, TIMING
+from crgame_ros.study.quality import CHECKS
 from crgame_ros.study.session_journal import SessionEvent
 from crgame_ros.yaml_text import read_yaml
 import pytest
@@ -100,7 +100,7 @@ def test_all_words_are_in_each_language_with_the_same_gaps_to_fill() -> None:
     assert {f'work_{work}' for work in DriveWork if work} == _begin('work_', english)
     told = {f'log_{event}' for event in SessionEvent}
     assert told <= english.keys() and {'log_released', 'log_at'} < _begin('log_', english) - told
-    assert {f'check_{name}': check.words for name, check in {**TIMING, **PAGE}.items()} == {
+    assert {f'check_{name}': check.words for name, check in CHECKS.items()} == {
         key: english[key] for key in _begin('check_', english)}
 
 

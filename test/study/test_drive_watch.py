@@ -6,7 +6,7 @@ from crgame_ros.game.task_documents import TaskEntry
 from crgame_ros.messages.status_values import Status
 from crgame_ros.schema.reading import read
 from crgame_ros.study.drive_watch import DriveWatch
-from crgame_ros.study.quality import PAGE, QualityBounds, TIMING
+from crgame_ros.study.quality import PAGE, QualityBounds
 
 
 def view(**values: object) -> Status:
@@ -71,10 +71,10 @@ def test_bounds_are_those_of_the_study() -> None:
     watch.add(view(full_screen=False), 2.0)
     watch.add(view(full_screen=False), 3.0)
     values = watch.values()
-    told = QualityBounds().faults(values, {**TIMING, **PAGE})
+    told = QualityBounds().faults(values)
     assert told == ['greatest cumulative error 120 ms instead of at most 100 ms']
     bounds = read(QualityBounds, {'max_cumulative_error_s': None, 'windowed_s': 0.5}, 'quality')
-    assert bounds.faults(values, {**TIMING, **PAGE}) == [
+    assert bounds.faults(values) == [
         'page not in full screen 1.0 s instead of at most 0.5 s']
     assert ('greatest cumulative error', 'not checked') in bounds.told()
 

@@ -16,7 +16,7 @@ from crgame_ros.driver.source import COCKPIT
 from crgame_ros.paths import make_folder
 from crgame_ros.study.drive_watch import DrivePhase, DriveState, DriveWatch
 from crgame_ros.study.participant_session import ParticipantSession
-from crgame_ros.study.quality import Excess, PAGE, TIMING
+from crgame_ros.study.quality import Excess
 from crgame_ros.study.session_journal import SessionEvent
 from crgame_ros.study.session_script import SessionItem, settings_of
 from crgame_ros.study.trial_game import seats_of, trial_game
@@ -267,8 +267,7 @@ class Rider:
     @property
     def doubts(self) -> tuple[Excess, ...]:
         """Return what of the present drive's data is beyond a bound of the study so far."""
-        return tuple(self.session.study.quality.excesses(
-            self.drive_watch.values(), {**TIMING, **PAGE}))
+        return tuple(self.session.study.quality.excesses(self.drive_watch.values()))
 
     def tell_doubts(self) -> None:
         """Tell what is beyond a bound as soon as it is."""

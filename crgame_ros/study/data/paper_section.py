@@ -3,6 +3,7 @@
 """Collects the facts about a study that a paper has to report."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 import hashlib
 from pathlib import Path
 import statistics
@@ -57,7 +58,7 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
             for scale in data.asked.scales()],
         'delays_s': {name: spread([row.get(name) for row in rows])
                      for name in ('input_delay_s', 'link_delay_s')},
-        'quality_bounds': study.quality.as_dict(),
+        'quality_bounds': asdict(study.quality),
         'view': {'geometry': 'docs/driver_view.md',
                  'shown': sorted({row['view'] for row in rows if row.get('view')}),
                  **{name: spread([row.get(name) for row in rows]) for name in _VIEW_NAMES}},

@@ -13,7 +13,7 @@ from crgame_ros.study.desk.page_markdown import read_tree
 from crgame_ros.study.drive_watch import DrivePhase
 from crgame_ros.study.file import Break, DeviceCheck, Page, Questions
 from crgame_ros.study.participant_session import ParticipantSession
-from crgame_ros.study.quality import Excess, PAGE, QualityBounds, TIMING
+from crgame_ros.study.quality import Excess, QualityBounds
 from crgame_ros.study.question import (
     ChoiceQuestion,
     LikertQuestion,
@@ -210,7 +210,7 @@ def _doubts_of(entry: JournalEntry, quality: QualityBounds) -> list[dict[str, ob
     """Return what of a finished drive's values is beyond a bound, without what is no number."""
     values = {name: value for name, value in (entry.get('quality') or {}).items()
               if isinstance(value, int | float) and math.isfinite(value)}
-    return list(map(_doubt, quality.excesses(values, {**TIMING, **PAGE})))
+    return list(map(_doubt, quality.excesses(values)))
 
 
 def _pause_h(session: ParticipantSession) -> float:
