@@ -182,13 +182,8 @@ def last_answers(entries: Iterable[JournalEntry]) -> dict[str, Answers]:
 
     :param entries: of a journal.
     """
-    found: dict[str, Answers] = {}
-    for entry in entries:
-        if entry['entry'] == SessionEvent.FINISHED:
-            found[entry['item']] = entry.get('answers') or {}
-        elif entry['entry'] in (SessionEvent.REPEATED, SessionEvent.SKIPPED):
-            found.pop(entry['item'], None)
-    return found
+    return {item: entry.get('answers') or {} for item, entry in done_items(entries).items()
+            if entry['entry'] == SessionEvent.FINISHED}
 
 
 def field_answers(items: Iterable[SessionItem], answers: Mapping[str, Answers]) -> Answers:

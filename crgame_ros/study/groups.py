@@ -16,7 +16,13 @@ from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Within
 from crgame_ros.study.local_text import ColumnName
 from crgame_ros.study.question import Answer, ChoiceQuestion, Question
-from crgame_ros.study.session_journal import JournalEntry, read_journal, SessionEvent
+from crgame_ros.study.session_journal import (
+    first_of,
+    how_ended,
+    JournalEntry,
+    read_journal,
+    SessionEvent,
+)
 from crgame_ros.study.trial_order import shuffled
 from crgame_ros.study.trial_settings import Factor, Level
 
@@ -281,17 +287,13 @@ class Enrolment:
 
 def read_enrolment(folder: Path) -> Enrolment | None:
     """Return the enrolment of the participant of a folder; None before the session has begun."""
-    found: Enrolment | None = None
-    for entry in read_journal(folder):
-        if found is None:
-            if entry['entry'] == SessionEvent.BEGUN:
-                found = Enrolment(folder.name, entry['place'])
-        elif entry['entry'] in (SessionEvent.ENDED, SessionEvent.EXCLUDED):
-            found = Enrolment(found.participant, found.place, True, found.allocation)
-        elif entry['entry'] == SessionEvent.ALLOCATED:
-            found = Enrolment(found.participant, found.place, found.dropped_out,
-                              allocation_of(entry))
-    return found
+    entries = read_journal(folder)
+    begun = first_of(entries, SessionEvent.BEGUN)
+    if begun is None:
+        return None
+    allocated = first_of(entries, SessionEvent.ALLOCATED)
+    return Enrolment(folder.name, begun['place'], how_ended(entries) is not None,
+                     None if allocated is None else allocation_of(allocated))
 
 
 def allocation_of(entry: JournalEntry) -> Allocation:

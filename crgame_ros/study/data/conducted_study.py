@@ -143,13 +143,9 @@ class ParticipantRecord:
     @cached_property
     def to_repeat(self) -> frozenset[str]:
         """Return the items whose requested repeat has not been driven yet."""
-        found: set[str] = set()
-        for entry in self.entries:
-            if entry['entry'] == SessionEvent.REPEATED:
-                found.add(entry['item'])
-            elif entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
-                found.discard(entry['item'])
-        return frozenset(found)
+        repeated = frozenset(entry['item'] for entry in self.entries
+                             if entry['entry'] == SessionEvent.REPEATED)
+        return repeated.difference(done_items(self.entries))
 
     @cached_property
     def answered(self) -> tuple[AnsweredItem, ...]:

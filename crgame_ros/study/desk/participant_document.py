@@ -24,7 +24,13 @@ from crgame_ros.study.question import (
     VasQuestion,
 )
 from crgame_ros.study.questionnaire import scale_of
-from crgame_ros.study.session_journal import DECLINED, how_ended, JournalEntry, SessionEvent
+from crgame_ros.study.session_journal import (
+    DECLINED,
+    done_items,
+    how_ended,
+    JournalEntry,
+    SessionEvent,
+)
 from crgame_ros.study.session_script import Fields, PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 
@@ -224,29 +230,23 @@ def _pause_h(session: ParticipantSession) -> float:
 
 def _items(desk: Desk) -> list[dict[str, object]]:
     session = desk.session
-    attempts: Counter[str] = Counter()
-    states: dict[str, str] = {}
-    ends: dict[str, dict[str, object]] = {}
-    for entry in session.journal.entries:
-        name = entry.get('item', '')
-        match entry['entry']:
-            case SessionEvent.STARTED:
-                attempts[name] += 1
-            case SessionEvent.FINISHED | SessionEvent.SKIPPED:
-                states[name] = entry['entry']
-                ends[name] = {'outcome': entry.get('outcome') or '',
-                              'reason': (entry.get('reason') or '')[:LONGEST],
-                              'doubts': _doubts_of(entry, session.study.quality)}
-            case SessionEvent.REPEATED:
-                states.pop(name, None)
-                ends.pop(name, None)
-    now, without = session.next_item, {'outcome': '', 'reason': '', 'doubts': []}
-    state_of = {item.id: 'now' if now is not None and item.id == now.id
-                else states.get(item.id, 'to_come') for item in session.items}
-    return [{'id': item.id, **kind_of(item), 'attempts': attempts[item.id],
-             'condition': _condition_of(item, state_of[item.id]),
-             'trial': item.what.number if isinstance(item.what, PlannedTrial) else item.trial,
-             **ends.get(item.id, without), 'state': state_of[item.id]} for item in session.items]
+    attempts = Counter(entry['item'] for entry in session.journal.entries
+                       if entry['entry'] == SessionEvent.STARTED)
+    done, now = done_items(session.journal.entries), session.next_item
+    found: list[dict[str, object]] = []
+    for item in session.items:
+        end = done.get(item.id)
+        state = 'now' if now is not None and item.id == now.id \
+            else 'to_come' if end is None else end['entry']
+        found.append({
+            'id': item.id, **kind_of(item), 'attempts': attempts[item.id],
+            'condition': _condition_of(item, state),
+            'trial': item.what.number if isinstance(item.what, PlannedTrial) else item.trial,
+            'outcome': '' if end is None else end.get('outcome') or '',
+            'reason': '' if end is None else (end.get('reason') or '')[:LONGEST],
+            'doubts': [] if end is None else _doubts_of(end, session.study.quality),
+            'state': state})
+    return found
 
 
 def _condition_of(item: SessionItem, state: str) -> str:
