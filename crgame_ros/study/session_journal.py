@@ -10,7 +10,7 @@ import json
 import os
 from pathlib import Path
 from types import TracebackType
-from typing import get_origin, get_type_hints, IO, Self, TypedDict
+from typing import get_origin, get_type_hints, IO, Literal, Self, TypedDict
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.study.question import Answer
@@ -218,6 +218,17 @@ def first_of(entries: Iterable[JournalEntry], *kinds: SessionEvent,
 def how_ended(entries: Iterable[JournalEntry]) -> JournalEntry | None:
     """Return the entry by which a session ended before its last item; None without one."""
     return first_of(entries, SessionEvent.ENDED, SessionEvent.EXCLUDED)
+
+
+def way_of_end(
+        entries: Iterable[JournalEntry]) -> Literal['excluded', 'declined', 'ended'] | None:
+    """Return the way in which a session ended before its last item; None without such an end."""
+    ended = how_ended(entries)
+    if ended is None:
+        return None
+    if ended['entry'] == SessionEvent.EXCLUDED:
+        return 'excluded'
+    return 'declined' if ended.get('reason') == DECLINED else 'ended'
 
 
 def chosen_language(entries: Sequence[JournalEntry]) -> str | None:

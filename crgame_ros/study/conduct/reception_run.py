@@ -26,7 +26,6 @@ from crgame_ros.study.folder import StudyFolder
 LINK_S, END_S = 60.0, 120.0
 # A session whose participant has gone leaves its place to another [min].
 ABSENT_MIN = 10.0
-_HOW = {'completed': 'done', 'excluded': 'excluded', 'declined': 'declined', 'ended': 'ended'}
 
 
 @dataclass(frozen=True)
@@ -91,8 +90,8 @@ class Sessions:
         if participant not in self._links:
             folder = self._request.folder.participant(participant)
             record = read_participant(self._request.study, folder)
-            if record is not None and record.part in _HOW:
-                return Reception(why=_HOW[record.part])
+            if record is not None and record.part != 'under way':
+                return Reception(why='done' if record.part == 'completed' else record.part)
             if len(self._links) >= self._request.capacity or self._is_ending:
                 return Reception(why='full')
             self._begin(participant)

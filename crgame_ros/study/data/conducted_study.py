@@ -19,13 +19,13 @@ from crgame_ros.study.question import Answer
 from crgame_ros.study.questionnaire import questions_of
 from crgame_ros.study.session_journal import (
     chosen_language,
-    DECLINED,
     done_items,
     first_of,
     how_ended,
     JournalEntry,
     read_journal,
     SessionEvent,
+    way_of_end,
 )
 from crgame_ros.study.session_script import items_before_groups, session_of, SessionItem
 from crgame_ros.study.staircase import Track
@@ -220,12 +220,7 @@ class ParticipantRecord:
     @property
     def part(self) -> Part:
         """Return the participant's part in the study: how far it went, or how it ended."""
-        if self.exclusion is not None:
-            return 'excluded'
-        ended = how_ended(self.entries)
-        if ended is not None:
-            return 'declined' if ended.get('reason') == DECLINED else 'ended'
-        return 'completed' if self.complete else 'under way'
+        return way_of_end(self.entries) or ('completed' if self.complete else 'under way')
 
     @property
     def failed_checks(self) -> list[str]:

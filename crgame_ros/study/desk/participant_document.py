@@ -25,11 +25,11 @@ from crgame_ros.study.question import (
 )
 from crgame_ros.study.questionnaire import scale_of
 from crgame_ros.study.session_journal import (
-    DECLINED,
     done_items,
     how_ended,
     JournalEntry,
     SessionEvent,
+    way_of_end,
 )
 from crgame_ros.study.session_script import Fields, PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
@@ -70,12 +70,7 @@ def participant_document(desk: Desk) -> dict[str, object]:
 
 def how_over(desk: Desk) -> str:
     """Return how a session ended: done, declined, excluded or ended."""
-    ended = how_ended(desk.session.journal.entries)
-    if ended is None:
-        return 'ended' if desk.ending else 'done'
-    if ended['entry'] == SessionEvent.EXCLUDED:
-        return 'excluded'
-    return 'declined' if ended['reason'] == DECLINED else 'ended'
+    return way_of_end(desk.session.journal.entries) or ('ended' if desk.ending else 'done')
 
 
 def _last_page(desk: Desk) -> list[object]:
