@@ -24,10 +24,10 @@ from aiohttp import (
 )
 from crgame_ros.cli import main
 from crgame_ros.cockpit.access import Access, reachable_addresses
+from crgame_ros.cockpit.exposure import Exposure
 from crgame_ros.cockpit.server import listen
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
-from crgame_ros.study.conduct.session_run import SessionRequest
 from crgame_ros.study.desk.desk import Desk, PINGS
 from crgame_ros.study.desk.pages import words_of
 from crgame_ros.study.desk.participant_document import participant_document
@@ -92,10 +92,10 @@ async def opened(folder: Path, **changed: Any) -> AsyncIterator[Opened]:
     study = write_study(folder / 'study', **changed)
     private = folder / '.private'
     private.mkdir(exist_ok=True)
-    request = SessionRequest(study, {'P07': folder / 'P07'}, 0, listen=ADDRESS)
+    exposure = Exposure(ADDRESS, 0, links=True, private=private)
     with ParticipantSession(study, folder / 'P07', 'P07', 0) as session:
         desk = Desk(session, DrivesWithoutGraph(session, step_s=0.02))
-        runner, lines = await serve_desk(desk, request.exposure(private).access(), private)
+        runner, lines = await serve_desk(desk, exposure.access(), private)
         participant, experimenter = (re.findall(r'https\S+', line)[0] for line in lines)
         async with ClientSession() as http:
             try:

@@ -18,7 +18,7 @@ from crgame_ros.processes import PARENT_VARIABLE
 from crgame_ros.study.data.conducted_study import read_participant
 from crgame_ros.study.desk.reception import create_reception_app, Reception
 from crgame_ros.study.desk.server import PARTICIPANT
-from crgame_ros.study.elsewhere import PlatformIds, private_folder
+from crgame_ros.study.elsewhere import PlatformIds
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.folder import StudyFolder
 
@@ -36,33 +36,21 @@ class ReceptionRequest:
     :param study: with `elsewhere`.
     :param file: of the study.
     :param folder: of its data.
-    :param listen: address at which other machines get the pages.
-    :param port: of the reception; each session takes the next two.
+    :param pages: how those of the reception are served; each session takes the next two ports.
     :param capacity: number of sessions at once.
-    :param certificate: PEM file; None makes one.
-    :param key: of the certificate.
     """
 
     study: StudyFile
     file: Path
     folder: StudyFolder
-    listen: str
-    port: int
+    pages: Exposure
     capacity: int
-    certificate: Path | None = None
-    key: Path | None = None
 
     def pair(self) -> tuple[Path, Path]:
         """Return the files of the certificate of all pages, and of its key."""
-        pair = self.exposure.pair()
+        pair = self.pages.pair()
         assert pair is not None
         return pair
-
-    @property
-    def exposure(self) -> Exposure:
-        """Return how the pages are served."""
-        return Exposure(self.listen, self.port, links=True, certificate=self.certificate,
-                        key=self.key, private=private_folder(self.folder.root))
 
 
 class Sessions:
@@ -126,7 +114,8 @@ class Sessions:
         certificate, key = request.pair()
         return [sys.executable, '-m', 'crgame_ros.cli', 'study', 'run', str(request.file),
                 '--participant', participant, '--out', str(request.folder.root),
-                '--port', str(request.port + 1 + 2 * place), '--listen', request.listen,
+                '--port', str(request.pages.port + 1 + 2 * place),
+                '--listen', request.pages.host,
                 '--certificate', str(certificate), '--key', str(key), '--absent', f'{ABSENT_MIN}']
 
     async def _conduct(self, participant: str, place: int) -> None:
@@ -170,7 +159,8 @@ async def run_reception(request: ReceptionRequest, say: Callable[[str], None]) -
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
     ids = PlatformIds.begun(request.folder.root)
-    access = Access(request.listen, request.port, ids.token, tls_context(*request.pair()))
+    access = Access(request.pages.host, request.pages.port, ids.token,
+                    tls_context(*request.pair()))
     sessions = Sessions(request, say)
     runner, port = await listen(
         create_reception_app(request.study, access, ids, sessions.receive), access.host,
@@ -178,7 +168,7 @@ async def run_reception(request: ReceptionRequest, say: Callable[[str], None]) -
     try:
         say(f'address for the platform, which puts its id for ID: {access.at_port(port).url}'
             f'&{elsewhere.id_from}=ID')
-        for line in request.exposure.certificate_lines():
+        for line in request.pages.certificate_lines():
             say(line)
         say(f'up to {request.capacity} at once; data go to {request.folder.root.resolve()}')
         await stop.wait()

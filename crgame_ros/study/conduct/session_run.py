@@ -5,7 +5,7 @@
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 import signal
@@ -17,10 +17,10 @@ from crgame_ros.software import software_with_commit
 from crgame_ros.study.conduct.live_drives import LiveDrives
 from crgame_ros.study.desk.desk import Desk
 from crgame_ros.study.desk.server import serve_desk
+from crgame_ros.study.elsewhere import private_folder
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.participant_session import ParticipantSession
 
-HOST = '127.0.0.1'
 # From "I am ready" to the first cycle [s].
 COUNTDOWN_S = 2.0
 # Time in which pages show the end and the experimenter may still add a note [s].
@@ -34,40 +34,24 @@ class SessionRequest:
 
     :param study: its study.
     :param folders: of the participants, by their anonymous ids, in the order of their seats.
-    :param port: of the first pages; others and the cockpit take later ones.
+    :param pages: how the first participant's pages are served, but for the private folder; those
+        of others, and the cockpit, take later ports.
     :param place: among all participants, from 0 on; by default the next free one.
     :param group: that the experimenter gives.
-    :param listen: address at which other machines get the pages, by links over TLS; None serves
-        this machine alone.
-    :param certificate: PEM file; None makes one.
-    :param key: of the certificate.
     :param absent_s: ends the program if no page of the participant is heard for so long [s]
     """
 
     study: StudyFile
     folders: Mapping[str, Path]
-    port: int
+    pages: Exposure
     place: int | None = None
     group: str | None = None
-    listen: str | None = None
-    certificate: Path | None = None
-    key: Path | None = None
     absent_s: float = math.inf
 
     @property
     def names(self) -> str:
         """Return the ids of the participants in one text."""
         return ' and '.join(self.folders)
-
-    def exposure(self, private: Path, number: int = 0) -> Exposure:
-        """
-        Return how a participant's pages are served.
-
-        :param private: folder of links and certificate.
-        :param number: of the participant, from 0 on.
-        """
-        return Exposure(self.listen or HOST, self.port + number, links=self.listen is not None,
-                        certificate=self.certificate, key=self.key, private=private)
 
 
 def conduct(request: SessionRequest, say: Callable[[str], None]) -> bool:
@@ -116,16 +100,15 @@ async def _conduct(sessions: Sequence[ParticipantSession], request: SessionReque
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         loop.add_signal_handler(number, stop.set)
     origins: list[str] = []
-    private = [folder / '.private' for folder in request.folders.values()]
-    for path in private:
-        path.mkdir(parents=True, exist_ok=True, mode=0o700)
-    exposures = [request.exposure(path, number) for number, path in enumerate(private)]
+    private = [private_folder(folder) for folder in request.folders.values()]
+    exposures = [replace(request.pages, port=request.pages.port + number, private=path)
+                 for number, path in enumerate(private)]
     pair = exposures[0].pair()
     opened = [] if pair is None else [
         '--open-cockpit', '--listen', exposures[0].host, '--certificate', str(pair[0]),
         '--key', str(pair[1])]
     drives = LiveDrives(
-        sessions, next(iter(request.folders.values())), request.port + len(sessions),
+        sessions, next(iter(request.folders.values())), request.pages.port + len(sessions),
         lambda: ['--countdown', str(COUNTDOWN_S), *opened,
                  *(f'--framed-by={origin}' for origin in origins)],
         None if pair is None else pair[0])

@@ -4,15 +4,20 @@
 
 import argparse
 import asyncio
+from dataclasses import replace
 from functools import partial
 import math
 from pathlib import Path
 import sys
+from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.paths import config_directory, scenarios_directory
 from crgame_ros.study.conduct.plan_commands import add_plan_arguments
 from crgame_ros.study.data.study_data_command import add_data_arguments
+
+if TYPE_CHECKING:  # A slow import that other commands do not need.
+    from crgame_ros.cockpit.exposure import Exposure
 
 DESCRIPTION = """\
 Plan an experiment with people: who drives which trials in which order, and what is asked.
@@ -94,23 +99,25 @@ def _add_opening(command: argparse.ArgumentParser, port: str) -> None:
                          help='PEM file with the key of the certificate')
 
 
-def _check_opening(values: argparse.Namespace) -> None:
+def _pages_of(values: argparse.Namespace) -> 'Exposure':
     """
-    Check these options before anything is begun.
+    Return how the pages are served by these options, which are checked before anything is begun.
 
     :raises InputError: if one cannot be used.
     """
     from crgame_ros.cockpit.access import check_address
-    from crgame_ros.cockpit.exposure import check_certificate
+    from crgame_ros.cockpit.exposure import check_certificate, Exposure
     if not 1 <= values.port <= 65_000:
         raise InputError(f'is {values.port}', '--port', 'give 1 to 65000')
     if values.listen is None:
         if values.certificate is not None:
             raise InputError('is of no use on this machine alone', '--certificate',
                              'give --listen too')
-        return
+        return Exposure('127.0.0.1', values.port)
     check_certificate(values.certificate, values.key)
     check_address(values.listen, values.port)
+    return Exposure(values.listen, values.port, links=True, certificate=values.certificate,
+                    key=values.key)
 
 
 def new_command(values: argparse.Namespace) -> int:
@@ -202,7 +209,7 @@ def run_command(values: argparse.Namespace) -> int:
     from crgame_ros.study.conduct.session_run import conduct, SessionRequest
     study = load_study(values.file)
     participants = [check_participant(name) for name in values.participant.split(',')]
-    _check_opening(values)
+    pages = _pages_of(values)
     if not values.absent > 0.0:
         raise InputError(f'is {values.absent:g}', '--absent', 'give minutes above 0')
     if values.place is not None and not 1 <= values.place <= 10_000:
@@ -220,9 +227,8 @@ def run_command(values: argparse.Namespace) -> int:
         folder.begin(participant)
     folder.keep_study(study, values.file, pictures_of(study))
     request = SessionRequest(
-        study, {name: folder.participant(name).resolve() for name in participants}, values.port,
-        None if values.place is None else values.place - 1, values.group, values.listen,
-        values.certificate, values.key, 60.0 * values.absent)
+        study, {name: folder.participant(name).resolve() for name in participants}, pages,
+        None if values.place is None else values.place - 1, values.group, 60.0 * values.absent)
     over = conduct(request, print_now)
     one = members == 1
     print_now(f'{request.names} {"is" if one else "are"} done' if over
@@ -236,7 +242,7 @@ def serve_command(values: argparse.Namespace) -> int:
 
     :raises CrgameError: if the study has no platform, cannot be run, or no address can be used.
     """
-    from crgame_ros.study.elsewhere import PlatformIds
+    from crgame_ros.study.elsewhere import PlatformIds, private_folder
     from crgame_ros.study.file import load_study
     from crgame_ros.study.folder import StudyFolder
     from crgame_ros.study.session_script import members_of
@@ -258,7 +264,7 @@ def serve_command(values: argparse.Namespace) -> int:
         raise InputError('is missing', '--listen', 'name the address that participants reach')
     if not 1 <= values.capacity <= 100:
         raise InputError(f'is {values.capacity}', '--capacity', 'give 1 to 100')
-    _check_opening(values)
+    pages = _pages_of(values)
     from crgame_ros.ros.environment import prepare_environment, require_ros
     require_ros()
     prepare_environment()
@@ -269,6 +275,6 @@ def serve_command(values: argparse.Namespace) -> int:
     # Once, before several sessions would do so at once.
     folder.keep_study(study, values.file, pictures_of(study))
     asyncio.run(run_reception(ReceptionRequest(
-        study, values.file, folder, values.listen, values.port, values.capacity,
-        values.certificate, values.key), print_now))
+        study, values.file, folder, replace(pages, private=private_folder(folder.root)),
+        values.capacity), print_now))
     return 0
