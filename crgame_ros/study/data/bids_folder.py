@@ -60,22 +60,6 @@ SAMPLING = ('on the clock of the run, without its pauses; at each time the neare
 FloatArray = NDArray[np.float64]
 
 
-class InstrumentEvent(NamedTuple):
-    """
-    A sample of a stream without a steady rate.
-
-    :param wall_s: when [s since 1970]
-    :param run_time_s: when, on the run's clock [s]
-    :param stream: of which.
-    :param value: its text, or the values of its channels as JSON; None without a value.
-    """
-
-    wall_s: float
-    run_time_s: float
-    stream: str
-    value: str | None
-
-
 class _Stream(NamedTuple):
     """A stream of a trial: rate, units by channel, times (R) [s], values (R, C) or texts."""
 
@@ -111,19 +95,19 @@ def _write_recordings(trial: CountedTrial, folder: Path, participant: str, task:
         text = ''.join('\t'.join(map(_cell, row)) + '\n' for row in rows.tolist())
         # Equal data give equal bytes: no time of writing.
         write_bytes(gzip.compress(text.encode('utf-8'), mtime=0), folder / f'{name}.tsv.gz')
-        write_text(json.dumps({
+        _json(folder / f'{name}.json', {
             'TaskName': task, 'SamplingFrequency': stream.rate_hz,
             'StartTime': start_s + stream.times_s.min(),
             'Columns': list(stream.units), 'Description': f'{stream.id}, {SAMPLING}',
             **{channel: {'Description': f'channel {channel} of {stream.id}',
                          **({'Units': unit} if unit else {})}
-               for channel, unit in stream.units.items()}},
-            indent=2, ensure_ascii=False) + '\n', folder / f'{name}.json')
+               for channel, unit in stream.units.items()}})
 
 
-def _instrument_events(trial: CountedTrial) -> Iterator[InstrumentEvent]:
-    """Yield the samples of a trial's streams that have no steady rate."""
-    start_s = drive_start_s(trial.attempt)
+def _instrument_events(trial: CountedTrial) -> Iterator[list[object]]:
+    """Yield the rows of the samples of a trial's streams that have no steady rate."""
+    attempt = trial.attempt
+    start_s = drive_start_s(attempt)
     for stream in _streams(trial):
         if stream.rate_hz and not stream.texts:
             continue
@@ -131,10 +115,13 @@ def _instrument_events(trial: CountedTrial) -> Iterator[InstrumentEvent]:
             sample: list[str | None] | list[float] = \
                 stream.texts[place] if stream.texts else stream.values[place].tolist()
             first = None if sample[0] != sample[0] else sample[0]
+            # The text or number of one channel, or the values of several as JSON.
             value = json.dumps(finite(dict(zip(stream.units, sample, strict=True))),
                                ensure_ascii=False) if len(sample) > 1 \
                 else None if first is None else str(first)
-            yield InstrumentEvent(start_s + time_s, time_s, stream.id, value)
+            yield [start_s + time_s - trial.record.begun_at, 0.0, KIND,
+                   attempt.trial.condition.name, attempt.trial.number, attempt.attempt,
+                   attempt.item, stream.id, value, time_s]
 
 
 def resampled(times_s: FloatArray, values: FloatArray, rate_hz: float) -> FloatArray:
@@ -181,7 +168,7 @@ def _streams(trial: CountedTrial) -> Iterator[_Stream]:
 
 def _instrument_label(name: str, taken: set[str]) -> str:
     """Return a label of letters and digits that no other stream of the trial has."""
-    plain = found = re.sub(r'[^A-Za-z0-9]', '', name) or 'stream'
+    plain = found = _label(name) or 'stream'
     number = 1
     while found in taken:
         number += 1
@@ -226,8 +213,7 @@ def write_bids(data: StudyData, out: Path) -> None:
         mine = [row for row in events if row['participant'] == record.id]
         trials = [trial for trial in data.trials if trial.record is record]
         rows = [*_events(record, mine), *(
-            _instrument_row(record, trial, event)
-            for trial in trials for event in _instrument_events(trial))]
+            row for trial in trials for row in _instrument_events(trial))]
         # Equal times stay in the order of the journal.
         rows.sort(key=lambda row: row[0])
         _tsv(folder / f'{name}.tsv', list(_EVENT_COLUMNS), rows)
@@ -283,14 +269,6 @@ def _events(record: ParticipantRecord,
         yield [onset, duration, kind, None if attempt is None else
                attempt.trial.condition.name, row['trial'], row['attempt'], row['item'], name,
                value, row['time_s']]
-
-
-def _instrument_row(record: ParticipantRecord, trial: CountedTrial,
-                    event: InstrumentEvent) -> list[object]:
-    attempt = trial.attempt
-    return [event.wall_s - record.begun_at, 0.0, KIND, attempt.trial.condition.name,
-            attempt.trial.number, attempt.attempt, attempt.item, event.stream, event.value,
-            event.run_time_s]
 
 
 def _sidecar() -> dict[str, dict[str, str]]:
