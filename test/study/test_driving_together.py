@@ -212,7 +212,7 @@ def test_recordings_are_those_of_the_first_and_go_with_any_of_them(tmp_path: Pat
     assert record is not None and record.members == PAIR
     assert {attempt.folder for attempt in record.attempts} == {
         root / 'participants' / 'P01' / 'runs' / '1'}
-    held = [each.path.relative_to(root).as_posix() for each in Withdrawal(root, 'P02').held()]
+    held = [path.relative_to(root).as_posix() for path in Withdrawal(root, 'P02').held()]
     assert held == ['participants/P01/runs/1', 'participants/P02']
 
 

@@ -118,7 +118,7 @@ def withdraw_command(values: argparse.Namespace) -> int:
     :return: 1 if the answer was no.
     :raises InputError: if there are none, the session is open, or something cannot be deleted.
     """
-    from crgame_ros.study.data.withdrawal import Withdrawal
+    from crgame_ros.study.data.withdrawal import told_of, Withdrawal
     from crgame_ros.study.folder import check_participant
     name = check_participant(values.participant)
     withdrawal = Withdrawal(values.folder, name)
@@ -126,8 +126,8 @@ def withdraw_command(values: argparse.Namespace) -> int:
         if not sys.stdin.isatty():
             raise InputError('there is no terminal to ask in', 'study withdraw',
                              'give --yes to delete without being asked')
-        for each in withdrawal.held():
-            print(f'to be deleted: {each.told()}')
+        for path in withdrawal.held():
+            print(f'to be deleted: {told_of(path)}')
         print('Tables are then written anew without the participant. This cannot be undone.')
         if input(f'Delete all data of {name}? Type {name}: ').strip() != name:
             print('nothing was deleted')

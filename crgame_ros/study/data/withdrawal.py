@@ -47,29 +47,11 @@ _STATE, _MOVED = 'withdrawal.json', 'participant'
 _TOLD = 'the data of a participant were deleted'
 
 
-@dataclass(frozen=True)
-class HeldData:
-    """
-    A file or folder with data of the participant.
-
-    :param path: of it.
-    :param files: number of its files.
-    :param size: of them together [bytes]
-    """
-
-    path: Path
-    files: int
-    size: int
-
-    @classmethod
-    def of(cls, path: Path) -> 'HeldData':
-        """Count the files of a path."""
-        files = [path] if path.is_file() else [each for each in path.rglob('*') if each.is_file()]
-        return cls(path, len(files), sum(each.stat().st_size for each in files))
-
-    def told(self) -> str:
-        """Return one line about it."""
-        return f'{self.path}: {self.files} file{"s" * (self.files != 1)}, {self.size} bytes'
+def told_of(path: Path) -> str:
+    """Return one line about a file or folder: number and size of its files."""
+    files = [path] if path.is_file() else [each for each in path.rglob('*') if each.is_file()]
+    size = sum(each.stat().st_size for each in files)
+    return f'{path}: {len(files)} file{"s" * (len(files) != 1)}, {size} bytes'
 
 
 @dataclass(frozen=True)
@@ -107,7 +89,7 @@ class Withdrawal:
             raise InputError('is no participant of this study', participant,
                              f'name a folder in {root / PARTICIPANTS}')
 
-    def held(self) -> list[HeldData]:
+    def held(self) -> list[Path]:
         """
         Return what is deleted: what was made of the participant's data, then the own folder.
 
@@ -115,7 +97,7 @@ class Withdrawal:
         The journal, which says who they are, is deleted last.
         """
         own = [path for path in (self._folder, self._pending / _MOVED) if path.exists()]
-        return [HeldData.of(path) for path in (*self._shared(own), *self._derived(), *own)]
+        return [*self._shared(own), *self._derived(), *own]
 
     def _shared(self, own: Sequence[Path]) -> Iterator[Path]:
         """Yield recordings of the participant's drives in the folder of another one."""
@@ -154,9 +136,9 @@ class Withdrawal:
         """
         with only_writer(self.root / DATA), self._closed_session():
             state = self._begin(today)
-            for each in self.held():
-                _delete(each.path)
-                say(f'deleted {each.told()}')
+            for path, told in [(path, told_of(path)) for path in self.held()]:
+                _delete(path)
+                say(f'deleted {told}')
             try:
                 self._write_anew(state.anew, say)
             except CrgameError as error:
