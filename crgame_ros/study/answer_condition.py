@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.marks import Listed, Within, Wording
-from crgame_ros.study.local_text import BESIDE, ColumnName
+from crgame_ros.study.local_text import ColumnName, MarkdownFile
 
 
 @dataclass(frozen=True)
@@ -152,8 +152,7 @@ class Exclusion:
     when: AnswerCondition | None = None
     attention_failed: Annotated[int, Within(1, 1000)] | None = None
     reason: Annotated[str, Wording(r'[^\x00-\x1f]{0,200}', 'give 200 characters at most')] = ''
-    page: Annotated[str, Wording(rf'{BESIDE}\.md',
-                                 'name a Markdown file beside this one')] | None = None
+    page: MarkdownFile | None = None
 
     def check(self) -> None:
         """Refuse a rule about nothing, or about two things."""

@@ -5,7 +5,6 @@
 from dataclasses import dataclass
 import hmac
 from pathlib import Path
-import re
 import secrets
 from typing import Annotated
 
@@ -18,6 +17,7 @@ PRIVATE, _KEY = '.private', 'platform.key'
 _KEY_BYTES = 32
 # 48 bits: of 10000 participants, two have one id with a probability of 2e-7.
 _ID_DIGITS = 12
+# A platform's id of a participant, or a code of it.
 _CODE = Wording('[A-Za-z0-9_-]{1,64}', 'give 1 to 64 letters, digits, - and _')
 _HERE = '{code}'
 
@@ -123,9 +123,8 @@ class PlatformIds:
         :param given: the platform's id.
         :raises InputError: if it is none.
         """
-        if re.fullmatch('[A-Za-z0-9_-]{1,64}', given) is None:
-            raise InputError('is no id of a platform', given[:40],
-                             'give 1 to 64 letters, digits, - and _')
+        if not _CODE.fits(given):
+            raise InputError('is no id of a platform', given[:40], _CODE.remedy)
         return f'E{self._digest(f"participant {given}")[:_ID_DIGITS]}'
 
     def _digest(self, text: str) -> str:

@@ -15,7 +15,7 @@ from crgame_ros.schema.reading import read
 from crgame_ros.study.answer_condition import Exclusion
 from crgame_ros.study.elsewhere import Elsewhere
 from crgame_ros.study.groups import Groups
-from crgame_ros.study.local_text import BESIDE, LocalText, Name, Text
+from crgame_ros.study.local_text import BESIDE, LocalText, MarkdownFile, Name, Text
 from crgame_ros.study.planned_analysis import Comparison, PlannedAnalysis
 from crgame_ros.study.quality import QualityBounds
 from crgame_ros.study.question import check_conditions, Question
@@ -74,7 +74,7 @@ class Page:
 
     FORM: ClassVar[Form] = Form(short='file')
 
-    file: Annotated[str, Wording(rf'{BESIDE}\.md', 'name a Markdown file beside this one')]
+    file: MarkdownFile
     consent: bool = False
     version: Annotated[str, Wording(r'[^\x00-\x1f]{0,60}', 'give 60 characters at most')] = ''
 
@@ -90,6 +90,11 @@ class Questions:
     FORM: ClassVar[Form] = Form(short='name')
 
     name: Annotated[str, Wording(BESIDE, 'name a questionnaire, or a YAML file beside this one')]
+
+    @property
+    def is_file(self) -> bool:
+        """Return whether it is a file beside the study's."""
+        return self.name.endswith(('.yaml', '.yml'))
 
 
 @dataclass(frozen=True)
@@ -326,12 +331,17 @@ class StudyFile:
             if entry.groups:
                 raise InputError('is only for some groups, which are not known yet',
                                  f'before[{number}]', 'put it into "before" of the first block')
-        for entry in (*self.after, *(entry for block in self.blocks for entry in (
-                *block.before, *block.after_trial, *block.after))):
+        for entry in self.step_entries:
             for name in entry.groups:
                 if name not in names:
                     raise InputError(f'names the group "{name}", which is not there', 'a step',
                                      f'name {", ".join(names) or "none: there are no groups"}')
+
+    @property
+    def step_entries(self) -> tuple[StepEntry, ...]:
+        """Return the steps between drives: those around all blocks, then those of each."""
+        return (*self.before, *self.after, *(entry for block in self.blocks for entry in (
+            *block.before, *block.after_trial, *block.after)))
 
     def _check_exclusions(self) -> None:
         known = {field.name for field in self.fields}

@@ -217,6 +217,6 @@ def _beside(study: StudyFile) -> list[str]:
                                       for language in (study.language, *study.languages))):
                 if (study.base / name).is_file():
                     names[name] = None
-        elif isinstance(step, Questions) and step.name.endswith(('.yaml', '.yml')):
+        elif isinstance(step, Questions) and step.is_file:
             names[step.name] = None
     return list(names)

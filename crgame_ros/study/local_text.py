@@ -18,6 +18,7 @@ Name = Annotated[str, Wording('[A-Za-z0-9][A-Za-z0-9_-]{0,39}',
                               'give 1 to 40 letters, digits, - and _')]
 # Pattern of the name of a file beside the study file, or below it.
 BESIDE = r'(?!([^\0]*/)?\.\.(/|$))[^/\0][^\0]*'
+MarkdownFile = Annotated[str, Wording(rf'{BESIDE}\.md', 'name a Markdown file beside this one')]
 
 
 @dataclass(frozen=True)

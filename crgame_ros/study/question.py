@@ -12,9 +12,8 @@ from crgame_ros.errors import InputError, short
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Advice, Keyed, Listed, Within
 from crgame_ros.study.answer_condition import AnswerCondition, holds_for, is_one_of
-from crgame_ros.study.local_text import ColumnName, LocalText, Text
+from crgame_ros.study.local_text import ColumnName, LocalText, MOST_CHARACTERS, Text
 
-MOST_CHARACTERS = 20_000
 # A limit that is not set is that far away.
 _UNLIMITED = 1e9
 Answer = float | str | list[str] | None

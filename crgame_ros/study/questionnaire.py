@@ -187,11 +187,8 @@ def load_questionnaire(name: str) -> Questionnaire:
 
 def steps_of(study: StudyFile) -> tuple[Step, ...]:
     """Return all steps between drives, each as often as in the file, then pages of exclusions."""
-    entries = [*study.before, *study.after]
-    for block in study.blocks:
-        entries += [*block.before, *block.after_trial, *block.after]
-    ends = tuple(Page(rule.page) for rule in study.exclude if rule.page is not None)
-    return (*(entry.step for entry in entries), *ends)
+    return (*(entry.step for entry in study.step_entries),
+            *(Page(rule.page) for rule in study.exclude if rule.page is not None))
 
 
 def page_file(study: StudyFile, page: Page, language: str) -> Path | None:
@@ -226,8 +223,7 @@ def scale_of(study: StudyFile, step: Questions) -> Questionnaire:
 
     :raises InputError: naming the file, the key and the remedy.
     """
-    is_file = step.name.endswith(('.yaml', '.yml'))
-    return load_questionnaire(str(study.base / step.name) if is_file else step.name)
+    return load_questionnaire(str(study.base / step.name) if step.is_file else step.name)
 
 
 def questionnaire_of(study: StudyFile, item: SessionItem) -> Questionnaire | None:
