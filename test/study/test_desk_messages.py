@@ -9,7 +9,7 @@ import sys
 
 from crgame_ros.errors import InputError
 from crgame_ros.paths import page_directory
-from crgame_ros.study.desk.messages import Finish, Note, parse_experimenter, parse_participant
+from crgame_ros.study.desk.messages import Finish, FROM_EXPERIMENTER, FROM_PARTICIPANT, Note
 from crgame_ros.study.desk.page_markdown import picture, read_tree
 from crgame_ros.study.desk.pages import languages_of, WORDS, words_of
 from crgame_ros.study.drive_watch import DrivePhase, DriveWork
@@ -35,22 +35,22 @@ from desk_support import write_study  # noqa: E402, I100
     '{"type":"ready"}', '{"type":"language","language":null}'])
 def test_messages_that_no_page_sends_are_refused(message: str) -> None:
     with pytest.raises(InputError):
-        parse_participant(message)
+        FROM_PARTICIPANT.read(message)
 
 
 def test_messages_of_the_experimenter_need_their_fields() -> None:
-    assert parse_experimenter('{"type":"note","text":"x","id":1,"more":2}') == Note(
+    assert FROM_EXPERIMENTER.read('{"type":"note","text":"x","id":1,"more":2}') == Note(
         text='x', id=1)
     for message in ('{"type":"note","text":" ","id":1}', '{"type":"note","text":"x"}',
                     '{"type":"end","reason":"","id":1}', '{"type":"hold","held":1,"id":1}',
                     '{"type":"skip","item":"a","reason":"","id":1}',
                     '{"type":"mark","name":"","id":1}', '{"type":"ready","item":"a"}'):
         with pytest.raises(InputError):
-            parse_experimenter(message)
+            FROM_EXPERIMENTER.read(message)
 
 
 def test_answers_keep_their_types_and_lose_what_is_no_character() -> None:
-    found = parse_participant(
+    found = FROM_PARTICIPANT.read(
         '{"type":"finish","item":"a","shown_at":1,"answered_at":2,"taken_s":1.5,"answers":'
         '{"a":3,"b":0.5,"c":["x"],"d":"\\ud800 \\ud83d\\ude00","e":null}}')
     assert isinstance(found, Finish)

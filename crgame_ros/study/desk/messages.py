@@ -155,20 +155,6 @@ class Hold(Order):
 ParticipantMessage = Hello | Here | Language | Ready | Finish | Ping
 ExperimenterOrder = Note | Mark | Reasoned | End | Hold
 ExperimenterMessage = ExperimenterOrder | Language | Ping
-_PARTICIPANT: MessageReader[ParticipantMessage] = MessageReader(ParticipantMessage)
-_EXPERIMENTER: MessageReader[ExperimenterMessage] = MessageReader(ExperimenterMessage)
-
-
-def parse_participant(text: str) -> ParticipantMessage:
-    """
-    Read a message of the participant's page.
-
-    :param text: one JSON object of at most `MAX_BYTES`.
-    :raises InputError: if it is malformed.
-    """
-    return _PARTICIPANT.read(text)
-
-
-def parse_experimenter(text: str) -> ExperimenterMessage:
-    """Read a message of the experimenter's page, as `parse_participant` does."""
-    return _EXPERIMENTER.read(text)
+# They read one JSON object of at most `MAX_BYTES` each.
+FROM_PARTICIPANT: MessageReader[ParticipantMessage] = MessageReader(ParticipantMessage)
+FROM_EXPERIMENTER: MessageReader[ExperimenterMessage] = MessageReader(ExperimenterMessage)

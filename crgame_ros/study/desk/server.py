@@ -34,9 +34,9 @@ from crgame_ros.paths import page_directory
 from crgame_ros.study.desk.desk import Desk
 from crgame_ros.study.desk.messages import (
     ExperimenterMessage,
+    FROM_EXPERIMENTER,
+    FROM_PARTICIPANT,
     MAX_BYTES,
-    parse_experimenter,
-    parse_participant,
     ParticipantMessage,
 )
 from crgame_ros.study.desk.page_markdown import consent_copy, picture
@@ -83,7 +83,8 @@ class DeskSocket(PageSocket[ExperimenterMessage | ParticipantMessage]):
 
     def parse(self, text: str) -> ExperimenterMessage | ParticipantMessage:
         """Return the message in a text."""
-        return parse_experimenter(text) if self._is_experimenter else parse_participant(text)
+        return FROM_EXPERIMENTER.read(text) if self._is_experimenter \
+            else FROM_PARTICIPANT.read(text)
 
     async def act(self, client: Client, message: ExperimenterMessage | ParticipantMessage) -> None:
         """Do what a message asks for."""
