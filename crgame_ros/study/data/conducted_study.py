@@ -3,7 +3,7 @@
 """A conducted study: its folder, and what the journals of its participants hold."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 import json
 from pathlib import Path
@@ -73,17 +73,20 @@ class AnsweredItem:
     :param item: of the session.
     :param answers: by question.
     :param at: wall clock [s since 1970]
-    :param attempt: number of the last finished attempt at the trial before it; None elsewhere.
     :param told: the content of the entry: when they were shown, and each answer's time.
-    :param after: that attempt; None elsewhere.
+    :param after: the last finished attempt at the trial before it; None elsewhere.
     """
 
     item: SessionItem
     answers: Mapping[str, Answer]
     at: float
-    attempt: int | None
     told: JournalEntry
     after: TrialAttempt | None
+
+    @property
+    def attempt(self) -> int | None:
+        """Return the number of that attempt."""
+        return None if self.after is None else self.after.attempt
 
 
 @dataclass(frozen=True)
@@ -151,22 +154,18 @@ class ParticipantRecord:
     def answered(self) -> tuple[AnsweredItem, ...]:
         """Return each item's last answers, in the order of the session."""
         found: dict[str, AnsweredItem] = {}
-        driven: dict[int, int] = {}
-        ended: dict[int, TrialAttempt | None] = {}
-        numbers = {each.item: each for each in self.attempts if each.ending == 'finished'}
+        driven: dict[int, TrialAttempt | None] = {}
         for entry in self.entries:
             item = self.items.get(entry.get('item', ''))
             if entry['entry'] != SessionEvent.FINISHED or item is None:
                 continue
-            if item.id in numbers and isinstance(item.what, PlannedTrial):
-                driven[item.what.number] = self._attempt_of(entry, item.id)
-                ended[item.what.number] = next(
+            if isinstance(item.what, PlannedTrial):
+                driven[item.what.number] = next(
                     (each for each in self.attempts if each.told is entry), None)
             elif entry.get('answers'):
-                attempt = None if item.trial is None else driven.get(item.trial)
-                after = None if item.trial is None else ended.get(item.trial)
-                found[item.id] = AnsweredItem(item, self._valid(item, entry['answers']),
-                                              entry['at'], attempt, entry, after)
+                found[item.id] = AnsweredItem(
+                    item, self._valid(item, entry['answers']), entry['at'], entry,
+                    None if item.trial is None else driven.get(item.trial))
         return tuple(found[name] for name in self.items if name in found)
 
     def _valid(self, item: SessionItem, answers: Mapping[str, Answer]) -> dict[str, Answer]:
@@ -243,12 +242,6 @@ class ParticipantRecord:
         """Return the language that the participant chose last; None without a choice."""
         return chosen_language(self.entries)
 
-    def _attempt_of(self, entry: JournalEntry, item: str) -> int:
-        told = entry.get('attempt')
-        before = [each for each in self.attempts if each.item == item and
-                  each.started_at <= entry['at']]
-        return told if told is not None else before[-1].attempt if before else 1
-
     def _attempts(self) -> Iterator[TrialAttempt]:
         openly: TrialAttempt | None = None
         for entry in self.entries:
@@ -258,14 +251,14 @@ class ParticipantRecord:
             kind = entry['entry']
             if kind == SessionEvent.STARTED:
                 if openly is not None:
-                    yield _ended(openly, 'lost', None, None)
+                    yield replace(openly, ending='lost')
                 openly = TrialAttempt(item.id, item.what, int(entry.get('attempt', 1)),
                                       self._run(entry), float(entry['at']))
             elif openly is not None and openly.item == item.id and kind in (
                     SessionEvent.FINISHED, SessionEvent.ABORTED):
-                folder = self._run(entry) or openly.folder
-                yield _ended(openly, 'finished' if kind == SessionEvent.FINISHED else 'aborted',
-                             entry, folder)
+                yield replace(
+                    openly, folder=self._run(entry) or openly.folder, ended_at=float(entry['at']),
+                    ending='finished' if kind == SessionEvent.FINISHED else 'aborted', told=entry)
                 openly = None
         if openly is not None:
             yield openly
@@ -276,13 +269,6 @@ class ParticipantRecord:
         if not name or '..' in Path(name).parts or Path(name).is_absolute():
             return None
         return self.recordings / name
-
-
-def _ended(attempt: TrialAttempt, ending: Ending, entry: JournalEntry | None,
-           folder: Path | None) -> TrialAttempt:
-    return TrialAttempt(attempt.item, attempt.trial, attempt.attempt, folder or attempt.folder,
-                        attempt.started_at, None if entry is None else float(entry['at']), ending,
-                        entry)
 
 
 def read_participant(study: StudyFile, folder: Path) -> ParticipantRecord | None:
