@@ -283,30 +283,25 @@ def read_participant(study: StudyFile, folder: Path) -> ParticipantRecord | None
     if begun is None:
         return None
     allocated = first_of(entries, SessionEvent.ALLOCATED)
-    allocation = None if allocated is None else allocation_of(allocated)
-    if allocation is not None and allocated is not None:
-        fits = allocation.group in study.group_names
-        items = session_of(study, allocation.place, allocation.group) if fits else ()
-        noted = allocated['items']
+    members = tuple(begun.get('members') or ())
+    allocation: Allocation | None = None
+    place, group = begun['place'], ''
+    if allocated is not None:
+        allocation = allocation_of(allocated)
+        place, group = allocation.place, allocation.group
+        items = session_of(study, place, group) if group in study.group_names else ()
+    elif study.groups is not None:
+        items = items_before_groups(study)
     else:
-        items = session_of(study, begun['place'], member=_member(begun)) \
-            if study.groups is None else items_before_groups(study)
-        noted = begun['items']
-    if [item.id for item in items] != noted:
+        member = members.index(begun['participant']) if members else 0
+        items = session_of(study, place, member=member)
+    if [item.id for item in items] != (allocated or begun)['items']:
         raise InputError('began with another plan than that of the study file', str(folder),
                          'put back the study file that the sessions were run with')
-    place, group = (begun['place'], '') if allocation is None else (
-        allocation.place, allocation.group)
     session = followed(study, place, group, items, entries)
     return ParticipantRecord(begun['participant'] or folder.name, begun['place'], folder, study,
                              {item.id: item for item in session.items}, entries, allocation,
-                             tuple(begun.get('members') or ()), session.tracks)
-
-
-def _member(begun: JournalEntry) -> int:
-    """Return the number of the participant among those who drove together."""
-    members = begun.get('members') or [begun['participant']]
-    return int(members.index(begun['participant']))
+                             members, session.tracks)
 
 
 class ConductedStudy:
@@ -349,14 +344,11 @@ class ConductedStudy:
 
         :raises InputError: if a participant began another study.
         """
-        return list(self._participants())
+        folder = self.path / PARTICIPANTS
+        paths = sorted(filter(Path.is_dir, folder.iterdir())) if folder.is_dir() else ()
+        return [found for path in paths
+                if (found := read_participant(self.study, path)) is not None]
 
     def relative(self, path: Path) -> str:
         """Return a file's path relative to the study's folder, as in the tables."""
         return path.relative_to(self.path).as_posix()
-
-    def _participants(self) -> Iterator[ParticipantRecord]:
-        folder = self.path / PARTICIPANTS
-        for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-            if path.is_dir() and (found := read_participant(self.study, path)) is not None:
-                yield found
