@@ -12,6 +12,8 @@ from crgame_ros.study.local_text import ColumnName
 from crgame_ros.study.trial_settings import Factor
 
 Alternative = Literal['two-sided', 'less', 'greater']
+# What is expected of the difference.
+HYPOTHESES: dict[Alternative, str] = {'two-sided': '≠ 0', 'greater': '> 0', 'less': '< 0'}
 
 
 @dataclass(frozen=True)

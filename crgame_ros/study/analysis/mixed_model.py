@@ -3,7 +3,7 @@
 """Linear mixed models of trials with a random intercept of each participant, by statsmodels."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 import math
 import warnings
@@ -142,8 +142,7 @@ def fit_model(formula: ModelFormula, rows: Sequence[Mapping[str, object]],
     model = MixedModel(formula, len(used), len(people))
     if len(people) < 2 or len(used) <= len(people) + len(names) \
             or np.linalg.matrix_rank(design) < len(names):
-        return MixedModel(formula, len(used), len(people),
-                          problem='there are too few trials for it')
+        return replace(model, problem='there are too few trials for it')
     values = np.array([row[formula.measure] for row in used], dtype=np.float64)
     return _fitted(model, values, design, np.array([people.index(str(row['participant']))
                                                     for row in used]), names)
@@ -152,7 +151,6 @@ def fit_model(formula: ModelFormula, rows: Sequence[Mapping[str, object]],
 def _fitted(model: MixedModel, values: FloatArray, design: FloatArray,
             groups: NDArray[np.int64], names: Sequence[str]) -> MixedModel:
     from statsmodels.regression.mixed_linear_model import MixedLM
-    formula = model.formula
     # statsmodels tells a variance of zero by an absolute bound: it gets standardised values.
     scale = float(values.std()) or 1.0
     with warnings.catch_warnings(record=True) as caught:
@@ -160,8 +158,7 @@ def _fitted(model: MixedModel, values: FloatArray, design: FloatArray,
         try:
             fit = MixedLM((values - values.mean()) / scale, design, groups).fit(reml=True)
         except (ValueError, np.linalg.LinAlgError) as error:
-            return MixedModel(formula, model.trials, model.participants,
-                              problem=f'it could not be fitted ({error})')
+            return replace(model, problem=f'it could not be fitted ({error})')
     told = list(dict.fromkeys(str(each.message).strip() for each in caught
                               if not issubclass(each.category, DeprecationWarning)))
     if not fit.converged and not told:
@@ -177,9 +174,10 @@ def _fitted(model: MixedModel, values: FloatArray, design: FloatArray,
         float(value + half * error), float(value / error),
         2.0 * float(norm.sf(abs(value / error))))
         for name, value, error in zip(names, estimates, errors, strict=True))
-    return MixedModel(formula, model.trials, model.participants, effects,
-                      scale * math.sqrt(float(np.asarray(fit.cov_re)[0, 0])),
-                      scale * math.sqrt(float(fit.scale)), '; '.join(told))
+    return replace(
+        model, effects=effects, problem='; '.join(told),
+        participant_sd=scale * math.sqrt(float(np.asarray(fit.cov_re)[0, 0])),
+        residual_sd=scale * math.sqrt(float(fit.scale)))
 
 
 def _design(formula: ModelFormula, rows: Sequence[Mapping[str, object]],

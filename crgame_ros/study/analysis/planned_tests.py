@@ -37,14 +37,14 @@ class PairedTest:
     participants: int
     first: float
     second: float
-    low: float
-    high: float
-    t: float
-    p: float
-    p_signed_rank: float
-    d_z: float
-    d_av: float
-    g_av: float
+    low: float = math.nan
+    high: float = math.nan
+    t: float = math.nan
+    p: float = math.nan
+    p_signed_rank: float = math.nan
+    d_z: float = math.nan
+    d_av: float = math.nan
+    g_av: float = math.nan
 
     @property
     def difference(self) -> float:
@@ -62,25 +62,36 @@ def paired_test(first: NDArray[np.float64], second: NDArray[np.float64], alterna
     :param alternative: about the difference, second less first.
     :param alpha: the interval is of 1 - alpha, and two-sided whatever the alternative.
     """
-    # A slow import.
-    from scipy.special import stdtr, stdtrit
     count = len(first)
     nan = math.nan
     if count < 2:
-        means = (float(first[0]), float(second[0])) if count else (nan, nan)
-        return PairedTest(count, *means, nan, nan, nan, nan, nan, nan, nan, nan)
+        return PairedTest(count, *((float(first[0]), float(second[0])) if count else (nan, nan)))
     differences = second - first
     mean, sd = float(differences.mean()), float(differences.std(ddof=1))
     error, freedom = sd / math.sqrt(count), count - 1
-    half = error * float(stdtrit(freedom, 1.0 - alpha / 2.0))
+    half = _half_width(error, freedom, alpha)
     spread = (float(first.std(ddof=1)) + float(second.std(ddof=1))) / 2.0
     t, d_av = (mean / error if error else nan), (mean / spread if spread else nan)
-    tail = {'two-sided': 2.0 * float(stdtr(freedom, -abs(t))),
-            'greater': float(stdtr(freedom, -t)), 'less': float(stdtr(freedom, t))}
     return PairedTest(
         count, float(first.mean()), float(second.mean()), mean - half, mean + half, t,
-        tail[alternative], _signed_rank(differences, alternative), mean / sd if sd else nan,
-        d_av, d_av * (1.0 - 3.0 / (4.0 * freedom - 1.0)))
+        _p_of(t, freedom, alternative), _signed_rank(differences, alternative),
+        mean / sd if sd else nan, d_av, d_av * (1.0 - 3.0 / (4.0 * freedom - 1.0)))
+
+
+def _half_width(error: float, freedom: float, alpha: float) -> float:
+    """Return half the width of Student's interval of 1 - alpha."""
+    # A slow import.
+    from scipy.special import stdtrit
+    return error * float(stdtrit(freedom, 1.0 - alpha / 2.0))
+
+
+def _p_of(t: float, freedom: float, alternative: Alternative) -> float:
+    """Return the p-value of Student's statistic."""
+    # A slow import.
+    from scipy.special import stdtr
+    if alternative == 'two-sided':
+        return 2.0 * float(stdtr(freedom, -abs(t)))
+    return float(stdtr(freedom, -t if alternative == 'greater' else t))
 
 
 def _signed_rank(differences: NDArray[np.float64], alternative: Alternative) -> float:
@@ -156,8 +167,6 @@ def unpaired_test(first: NDArray[np.float64], second: NDArray[np.float64],
     :param alternative: about the difference, second less first.
     :param alpha: the interval is of 1 - alpha, and two-sided whatever the alternative.
     """
-    # A slow import.
-    from scipy.special import stdtr, stdtrit
     counts = len(first), len(second)
     first_mean, second_mean = (float(values.mean()) if len(values) else math.nan
                                for values in (first, second))
@@ -172,15 +181,14 @@ def unpaired_test(first: NDArray[np.float64], second: NDArray[np.float64],
     difference = none.difference
     freedom = error ** 4 / sum(share ** 2 / (count - 1)
                                for share, count in zip(shares, counts, strict=True))
-    t, half = difference / error, error * float(stdtrit(freedom, 1.0 - alpha / 2.0))
-    tail = {'two-sided': 2.0 * float(stdtr(freedom, -abs(t))),
-            'greater': float(stdtr(freedom, -t)), 'less': float(stdtr(freedom, t))}
+    t, half = difference / error, _half_width(error, freedom, alpha)
     total = sum(counts)
     pooled = math.sqrt(sum((count - 1) * variance for count, variance in
                            zip(counts, variances, strict=True)) / (total - 2))
     d_s = difference / pooled
     return UnpairedTest(counts, first_mean, second_mean, difference - half, difference + half, t,
-                        freedom, tail[alternative], _rank_sum(first, second, alternative), d_s,
+                        freedom, _p_of(t, freedom, alternative),
+                        _rank_sum(first, second, alternative), d_s,
                         d_s * (1.0 - 3.0 / (4.0 * total - 9.0)))
 
 

@@ -19,6 +19,7 @@ from crgame_ros.study.data.asked_questions import AskedQuestions
 from crgame_ros.study.data.trials_table import declare_trials
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.folder import StudyFolder
+from crgame_ros.study.planned_analysis import HYPOTHESES
 from crgame_ros.study.session_script import members_of
 from crgame_ros.study.trial_order import OrderKind
 from crgame_ros.study.trial_plan import orders_of, told_trials
@@ -219,15 +220,14 @@ def _analysis(study: StudyFile, columns: Mapping[str, str]) -> Iterator[str]:
                 '|---|---|---|---|---|')
     for each in study.analysis.comparisons:
         for first, second in study.pairs_of(each):
-            hypothesis = {'two-sided': '≠ 0', 'greater': '> 0', 'less': '< 0'}[each.alternative]
             expected = 'not stated' if each.effect is None else \
                 f'{each.effect:g}, standard deviation {each.sd:g} (in a group)' \
                 if each.sd is not None and each.factor == study.between else \
                 f'{each.effect:g}, standard deviation {each.sd:g} (of a {each.sd_of})' \
                 if each.sd is not None else \
                 f'{"d_s" if each.factor == study.between else "d_z"} = {each.effect:g}'
-            yield f'| {each.measure} | {each.factor} | {second} − {first} | {hypothesis} ' \
-                f'| {expected} |'
+            yield f'| {each.measure} | {each.factor} | {second} − {first} ' \
+                f'| {HYPOTHESES[each.alternative]} | {expected} |'
     between = '' if study.groups is None else '; between groups d_s and g_s'
     yield from ('', method_of(study), '', 'Effect sizes: d_z, d_av, and g_av with Hedges’ '
                 f'correction (Lakens 2013){between}.', '', 'Mixed models of the trials, by '

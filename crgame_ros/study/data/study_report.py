@@ -36,6 +36,7 @@ from crgame_ros.study.data.preregistration import check_measures, method_of
 from crgame_ros.study.data.session_tables import counted_tracks, STAIRCASES
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
 from crgame_ros.study.file import StudyFile
+from crgame_ros.study.planned_analysis import HYPOTHESES
 from crgame_ros.study.staircase import StaircaseTrial, Track
 from crgame_ros.whole_file import write_text
 
@@ -59,7 +60,6 @@ _PARTS: dict[Part, str] = {
 _WIDTH, _PLOT, _TOP, _BOTTOM, _LEFT = 560, 170, 12, 30, 52
 _ENDS = {'reversals': 'reversals', 'at_most': 'number of trials'}
 _OUTCOMES = {True: 'success', False: 'failure', None: 'neither'}
-_ALTERNATIVES = {'two-sided': '≠ 0', 'greater': '> 0', 'less': '< 0'}
 
 
 def write_study_report(data: StudyData, path: Path) -> None:
@@ -345,7 +345,7 @@ def _tests(data: StudyData, tests: Sequence[PlannedTest]) -> str:
             f'{number(test.difference, digits)} <small>[{number(test.low, digits)}; '
             f'{number(test.high, digits)}]</small>',
             f'{number(test.t, 2)} <small>({df})</small>',
-            _ALTERNATIVES[each.comparison.alternative], _p(test.p), _p(each.p_holm), _p(p_rank)))
+            HYPOTHESES[each.comparison.alternative], _p(test.p), _p(each.p_holm), _p(p_rank)))
     ends = f'with {100.0 * (1.0 - alpha):g} % intervals'
     return ''.join(table(f'{words}, {ends}', (
         '', 'unit', 'n', 'first', 'second', 'difference', 't <small>(df)</small>', 'tested', 'p',
