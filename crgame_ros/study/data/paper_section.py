@@ -4,7 +4,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-import hashlib
 from pathlib import Path
 import statistics
 from typing import Any
@@ -22,8 +21,11 @@ from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.trials_table import measure_columns
 from crgame_ros.study.trial_plan import conditions_of
 
-# Columns of the trials table about the display.
-_VIEW_NAMES = ('view_across_deg', 'screen_width_m', 'eye_distance_m', 'view_rate_hz')
+# Columns of the trials table about the display, as text with their units.
+_GEOMETRY = (('view_across_deg', 'Angle across the picture', '°'),
+             ('screen_width_m', 'Width of the screen', ' m'),
+             ('eye_distance_m', 'Distance of the eyes from it', ' m'),
+             ('view_rate_hz', 'Pictures a second', ''))
 
 
 def provenance_of(data: StudyData) -> dict[str, Any]:
@@ -33,11 +35,12 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
     :raises InputError: if a file of the study cannot be read.
     """
     study, folder, rows = data.folder.study, data.folder, [trial.row for trial in data.trials]
-    files = sorted(path for path in folder.study_path.parent.rglob('*') if path.is_file())
+    files = folder.study_path.parent
     return {
         'study': study.name, 'title': study.title.in_language(study.language),
         'file': folder.relative(folder.study_path), 'seed': study.seed, 'made': data.made,
-        'files': {folder.relative(path): _digest(path) for path in files},
+        'files': {folder.relative(files / name): digest
+                  for name, digest in digests_of_folder(files).items()},
         'data_written_by': software_with_commit(),
         # As noted by the sessions: more than one if it changed during the study.
         'sessions_run_by': {record.id: record.software for record in data.records},
@@ -61,7 +64,7 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
         'quality_bounds': asdict(study.quality),
         'view': {'geometry': 'docs/driver_view.md',
                  'shown': sorted({row['view'] for row in rows if row.get('view')}),
-                 **{name: spread([row.get(name) for row in rows]) for name in _VIEW_NAMES}},
+                 **{name: spread([row.get(name) for row in rows]) for name, _, _ in _GEOMETRY}},
         'reference_points': {
             'positions and motion of vehicles': 'rear axle',
             'gaps, distances, times to collision': 'footprints, bumper to bumper',
@@ -75,10 +78,6 @@ def spread(values: list[float | None]) -> dict[str, float] | None:
             'of': len(known)} if known else None
 
 
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
 def _plain(value: object) -> object:
     """Return values in JSON form."""
     if isinstance(value, Mapping):
@@ -90,11 +89,6 @@ def _plain(value: object) -> object:
 
 _VIEWS = {'driver': "from the driver's seat", 'chase': 'from behind the vehicle',
           'map': 'from above, on the map', 'bird': 'from above'}
-
-_GEOMETRY = (('view_across_deg', 'Angle across the picture', '°'),
-             ('screen_width_m', 'Width of the screen', ' m'),
-             ('eye_distance_m', 'Distance of the eyes from it', ' m'),
-             ('view_rate_hz', 'Pictures a second', ''))
 
 
 def paper_section(data: StudyData) -> str:
