@@ -120,6 +120,10 @@ class DrivePhase(StrEnum):
     FAILED = 'failed'
 
 
+# During these phases of a drive no other item can come first.
+UNDER_WAY = (DrivePhase.COUNTDOWN, DrivePhase.DRIVING, DrivePhase.ENDED)
+
+
 class DriveWork(StrEnum):
     """Present work on a drive, or why there is none."""
 

@@ -22,7 +22,13 @@ from crgame_ros.study.conduct.study_drive import (
     write_drive,
 )
 from crgame_ros.study.conduct.study_graph import Director, make_links, StudyGraph
-from crgame_ros.study.drive_watch import DrivePhase, DriveState, DriveWatch, DriveWork
+from crgame_ros.study.drive_watch import (
+    DrivePhase,
+    DriveState,
+    DriveWatch,
+    DriveWork,
+    UNDER_WAY,
+)
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_script import is_driven, PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
@@ -121,7 +127,7 @@ class LiveDrives:
     async def close(self) -> None:
         """End the graph; a present drive does not count."""
         try:
-            if self._is_under_way:
+            if self._phase in UNDER_WAY:
                 self._abort_all(self._item, 'the study was ended')
         finally:
             # The graph ends even if the journals take no more entries.
@@ -134,10 +140,6 @@ class LiveDrives:
                 self._director = None
             if graph is not None:
                 await asyncio.to_thread(graph.end)
-
-    @property
-    def _is_under_way(self) -> bool:
-        return self._phase in (DrivePhase.COUNTDOWN, DrivePhase.DRIVING, DrivePhase.ENDED)
 
     def _abort_all(self, item: str, reason: str) -> None:
         for rider in self.riders:
@@ -295,7 +297,7 @@ class LiveDrives:
         if graph is not None and not graph.was_killed:
             words = graph.last_words()
         item = self._item
-        if self._is_under_way:
+        if self._phase in UNDER_WAY:
             self._abort_all(item, f'the simulation ended by itself: {words}')
         self._set_phase(DrivePhase.PREPARING, item, words, work=DriveWork.RESTARTING)
         await self.close()
@@ -311,7 +313,7 @@ class LiveDrives:
         if self._graph is not None and self._graph.has_ended:
             await self._lose()
             return
-        if self._is_under_way:
+        if self._phase in UNDER_WAY:
             self._abort_all(item.id, text)
         self._loaded = None
         try:

@@ -9,7 +9,6 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
-import time
 
 from aiohttp import ClientError, ClientSession, ClientTimeout, CookieJar, Fingerprint
 from crgame_ros.cockpit.exposure import fingerprint
@@ -22,7 +21,7 @@ from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.processes import PARENT_VARIABLE
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
 from crgame_ros.ros.environment import free_domain_id
-from crgame_ros.ros.messages import from_time
+from crgame_ros.ros.messages import from_time, NS_PER_S
 from crgame_ros.study.drive_watch import DriveWatch
 from diagnostic_msgs.msg import DiagnosticStatus
 import rclpy
@@ -32,7 +31,6 @@ _AT, _DIRECT = 'the cockpit is at ', '  to direct '
 # Time limit for finishing recordings [s].
 _END_S = 90.0
 _PATIENCE_S = 20.0
-NS_PER_S = 1_000_000_000
 _QUEUE = 100
 
 
@@ -105,20 +103,15 @@ class StudyGraph:
         errors = [line for line in lines if 'error' in line.lower() or ' died ' in line]
         return (errors or lines or ['it said nothing'])[-1].strip()[:300]
 
-    def ask_to_end(self) -> None:
-        """Request a clean shutdown."""
-        if not self.has_ended:
-            self._process.send_signal(signal.SIGINT)
-
     def end(self) -> None:
         """Shut it down, and wait until its recordings are finished."""
-        self.ask_to_end()
-        until_s = time.monotonic() + _END_S
-        while not self.has_ended and time.monotonic() < until_s:
-            time.sleep(0.05)
-        if not self.has_ended:
+        # To a process that has ended, no signal is sent.
+        self._process.send_signal(signal.SIGINT)
+        try:
+            self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:
             self._process.kill()
-        self._process.wait()
+            self._process.wait()
 
 
 async def make_links(director: str, certificate: Path, drivers: int) -> tuple[str, ...]:

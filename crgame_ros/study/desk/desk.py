@@ -11,7 +11,7 @@ import time
 from typing import Protocol
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.study.drive_watch import DrivePhase, DriveState
+from crgame_ros.study.drive_watch import DrivePhase, DriveState, UNDER_WAY
 from crgame_ros.study.file import Break, Page
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.questionnaire import consent_of
@@ -45,9 +45,6 @@ class Drives(Protocol):
     def abort(self, reason: str) -> None:
         """End the present drive; it does not count and is repeated."""
 
-
-# During these phases of a drive no other item can come first.
-UNDER_WAY = (DrivePhase.COUNTDOWN, DrivePhase.DRIVING, DrivePhase.ENDED)
 
 # Pings of the last seconds, of which half are needed to judge the link.
 PINGS = 10

@@ -8,9 +8,9 @@ from dataclasses import asdict
 import math
 
 from crgame_ros.study.answer_condition import AnswerCondition, holds_for
-from crgame_ros.study.desk.desk import Desk, UNDER_WAY
+from crgame_ros.study.desk.desk import Desk
 from crgame_ros.study.desk.page_markdown import read_tree
-from crgame_ros.study.drive_watch import DrivePhase
+from crgame_ros.study.drive_watch import DrivePhase, UNDER_WAY
 from crgame_ros.study.file import Break, DeviceCheck, Page, Questions
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.quality import Excess, QualityBounds
