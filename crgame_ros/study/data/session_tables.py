@@ -18,9 +18,10 @@ from crgame_ros.study.staircase import Track
 from crgame_ros.study.trial_plan import BlockStaircases, PlannedTrial
 
 # Entries of the journal with other names here.
-_OF_SESSION = {SessionEvent.BEGUN: 'session_begun', SessionEvent.OPENED: 'program_started',
-               SessionEvent.ENDED: 'session_ended', SessionEvent.ALLOCATED: 'group_allocated',
-               SessionEvent.EXCLUDED: 'participant_excluded'}
+_OF_SESSION: dict[str, str] = {
+    SessionEvent.BEGUN: 'session_begun', SessionEvent.OPENED: 'program_started',
+    SessionEvent.ENDED: 'session_ended', SessionEvent.ALLOCATED: 'group_allocated',
+    SessionEvent.EXCLUDED: 'participant_excluded'}
 _OF_ITEM = (SessionEvent.STARTED, SessionEvent.FINISHED, SessionEvent.ABORTED,
             SessionEvent.SKIPPED, SessionEvent.REPEATED)
 GAME_EVENT = 'game_event'
@@ -124,7 +125,7 @@ def _journal_rows(record: ParticipantRecord) -> Iterator[dict[str, Any]]:
 def _kind(kind: str, item: SessionItem | None) -> str:
     """Return the kind of a journal entry: trial_finished, practice_started, item_skipped, note."""
     if item is None or kind not in _OF_ITEM:
-        return _OF_SESSION.get(SessionEvent(kind), kind) if kind in set(SessionEvent) else kind
+        return _OF_SESSION.get(kind, kind)
     what = 'trial' if isinstance(item.what, PlannedTrial) else \
         'practice' if isinstance(item.what, PracticeDrives) else 'item'
     return f'{what}_{kind}'

@@ -356,17 +356,13 @@ def read_study_data(folder: ConductedStudy, say: Callable[[str], object],
         'trials': table_of_rows(data.trials_table.declaration, (each.row for each in data.trials)),
         'participants': table_of_rows(people.declaration, (
             people.row(record) for record in records)),
-        'answers': table_of_rows(ANSWERS, _answers(data)),
+        'answers': table_of_rows(ANSWERS, (
+            row for record in records for row in answer_rows(record, asked))),
         'events': table_of_rows(EVENTS_OF_SESSIONS, events)}
     if folder.study.staircases:
         data.tables[STAIRCASES.name] = table_of_rows(STAIRCASES, (
             row for record in records for row in staircase_rows(record)))
     return data
-
-
-def _answers(data: StudyData) -> Iterator[dict[str, object]]:
-    for record in data.records:
-        yield from answer_rows(record, data.asked)
 
 
 def _run(folder: ConductedStudy, record: ParticipantRecord, attempt: TrialAttempt,

@@ -27,7 +27,6 @@ _SUFFIXES = {'s': 's', 'm': 'm', 'm/s': 'm_per_s', 'm/s^2': 'm_per_s2', 'm/s^3':
              's^2': 's2', '1/s': 'per_s', '1/min': 'per_min', 'rad': 'rad',
              'rad/s': 'rad_per_s', 'Hz': 'hz'}
 _ASKED = 'it was not answered'
-SHARED = 'of a questionnaire'
 
 
 def with_unit(column: Column, prefix: str = '') -> Column:

@@ -27,7 +27,6 @@ from crgame_ros.study.data.study_row_table import flag_column, unlike, with_unit
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.quality import PAGE, TIMING
 from crgame_ros.study.trial_plan import PlannedTrial
-from crgame_ros.study.trial_settings import Factor
 
 _SCORED = ('hit_rate', 'response_mean_s', 'response_median_s')
 _ONE = 'there was no detection response task, or several: runs/detection_scores has each'
@@ -112,6 +111,16 @@ _RUN_COLUMNS = ('benchmark_id', 'scenario_sha256', 'game_sha256', 'duration_s',
                 'max_cumulative_error_s', 'timeout_ratio', 'real_time_ratio_final',
                 'real_time_ratio_mean', 'real_time_ratio_min', 'time_efficiency',
                 'precision_ratio', 'resets', 'gaps', 'catch_up_steps')
+_WATCHED = tuple(
+    Column(name, kind, unit, what, 'by the page and the log of tasks, during the drive',
+           empty='not watched') for name, kind, unit, what in (
+        ('stimuli', INTEGER, '1', 'lights and requests that came'),
+        ('unseen_stimuli', INTEGER, '1', 'of these, those that the page has not shown'),
+        ('away_s', NUMBER, 's', 'time for which the page was hidden or without the focus'),
+        ('windowed_s', NUMBER, 's', 'time for which the page did not fill the screen'),
+        ('device_changes', INTEGER, '1', 'changes of the input device'),
+        ('link_delay_max_s', NUMBER, 's', 'longest from the page to the simulation and back, of '
+         'one a second')))
 _TIMING = (
     Column('input_delay_s', NUMBER, 's', "median from the participant's hand to the first later "
            'state at the page, which is drawn after that', empty='not measured'),
@@ -131,19 +140,9 @@ _TIMING = (
     flag_column('timing_flag', 'whether its timing is beyond a bound'),
     Column('timing_reason', TEXT, '', 'what of its timing is beyond which bound',
            empty='nothing is'),
-    *(Column(name, kind, unit, what, 'by the page and the log of tasks, during the drive',
-             empty='not watched') for name, kind, unit, what in (
-        ('stimuli', INTEGER, '1', 'lights and requests that came'),
-        ('unseen_stimuli', INTEGER, '1', 'of these, those that the page has not shown'),
-        ('away_s', NUMBER, 's', 'time for which the page was hidden or without the focus'),
-        ('windowed_s', NUMBER, 's', 'time for which the page did not fill the screen'),
-        ('device_changes', INTEGER, '1', 'changes of the input device'),
-        ('link_delay_max_s', NUMBER, 's', 'longest from the page to the simulation and back, of '
-         'one a second'))),
+    *_WATCHED,
     flag_column('page_flag', "whether a value of the participant's page is beyond a bound"),
     Column('page_reason', TEXT, '', 'what of it is beyond which bound', empty='nothing is'))
-_WATCHED = ('stimuli', 'unseen_stimuli', 'away_s', 'windowed_s', 'device_changes',
-            'link_delay_max_s')
 _ANSWERED = Column('answered_attempt', INTEGER, '1', 'the attempt after which its questions were '
                    'answered', empty='there are no answers')
 _LEFT_OUT = ('run', 'id', 'role', 'driver', 'vehicle_model', 'planning_problem', 'length', 'width',
@@ -179,7 +178,7 @@ def declare_trials(study: StudyFile,
         taken.add(name)
         factors[factor.name] = Column(
             name, TEXT, '', f'level of the factor {factor.name}', empty='its block does not '
-            'cross it', variant=_between(study, factor),
+            'cross it', variant='between participants' if factor.name == study.between else '',
             values=factor.names)
     answers = [column for scale in asked.after_trials.values()
                for column in scale.columns(study.language)]
@@ -187,11 +186,6 @@ def declare_trials(study: StudyFile,
         'trials', 'a trial that counts', ('participant', 'trial'),
         (*_FIRST, *factors.values(), *((PLACE_IN_GROUP,) if study.groups is not None else ()),
          *stepped, *fixed, *_apart(answers, taken)))
-
-
-def _between(study: StudyFile, factor: Factor) -> str:
-    return 'between participants' if study.groups is not None \
-        and factor.name == study.groups.name else ''
 
 
 class TrialsTable:
@@ -217,15 +211,19 @@ class TrialsTable:
         :param problem: the reason for missing measures.
         """
         trial = attempt.trial
-        row = {**_identity(record, trial), **{
-            self.factors[name].name: level.name for name, level in trial.condition.levels},
+        row: dict[str, object] = {
+            'participant': record.id, 'trial': trial.number, 'place': record.place + 1,
+            'block': trial.block, 'place_in_block': trial.place, 'repetition': trial.repetition,
+            'condition': trial.condition.name,
+            **{self.factors[name].name: level.name for name, level in trial.condition.levels},
             **self._grouped(record), **_stepped(record, trial),
             **self._drive(record, attempt), 'problem': problem or None}
         if run is not None:
             row |= self._measured(attempt, run)
         watched = attempt.says('quality')
         if isinstance(watched, Mapping):
-            row |= {name: value for name, value in watched.items() if name in _WATCHED}
+            row |= {column.name: watched[column.name] for column in _WATCHED
+                    if column.name in watched}
         for kind, checks in (('timing', TIMING), ('page', PAGE)):
             faults = self._folder.study.quality.faults(row, checks)
             row |= {f'{kind}_flag': bool(faults), f'{kind}_reason': '; '.join(faults)}
@@ -330,12 +328,6 @@ def _view(periods: Sequence[Mapping[str, Any]]) -> dict[str, object]:
 
 def _seconds(delay_ms: float | None) -> float | None:
     return None if delay_ms is None else 1e-3 * delay_ms
-
-
-def _identity(record: ParticipantRecord, trial: PlannedTrial) -> Mapping[str, object]:
-    return {'participant': record.id, 'trial': trial.number, 'place': record.place + 1,
-            'block': trial.block, 'place_in_block': trial.place, 'repetition': trial.repetition,
-            'condition': trial.condition.name}
 
 
 def _apart(columns: list[Column], taken: set[str]) -> list[Column]:
