@@ -4,7 +4,6 @@
 
 from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from datetime import datetime, UTC
 from html import escape
 from pathlib import Path
@@ -147,27 +146,15 @@ def _source(given: str) -> str:
         or Path(name).suffix.lower() not in PICTURES else name
 
 
-@dataclass(frozen=True)
-class ConsentCopy:
-    """
-    A file for the participant.
-
-    :param name: of the file.
-    :param html: its content.
-    """
-
-    name: str
-    html: str
-
-
 def consent_copy(study: StudyFile, page: Page, language: str, participant: str, at_s: float,
-                 words: Mapping[str, str]) -> ConsentCopy:
+                 words: Mapping[str, str]) -> tuple[str, str]:
     """
-    Return the copy of a consent, with its pictures in it.
+    Return the copy of a consent as HTML, with its pictures in it.
 
     :param participant: id, by which the participant can have the data deleted.
     :param at_s: when the copy is made [s since 1970]
     :param words: of the page, in the language.
+    :return: the name of its file, and its content.
     :raises InputError: if the page cannot be read.
     """
     told = consent_of(study, page, language)
@@ -179,11 +166,11 @@ def consent_copy(study: StudyFile, page: Page, language: str, participant: str, 
     body = _html(study, read_tree(study, page, language))
     lines = ''.join(f'<p>{escape(fact)}</p>' for fact in facts)
     name = '_'.join(filter(None, (study.name, 'consent', told['sha256'][:8], language)))
-    return ConsentCopy(f'{name}.html', (
+    return f'{name}.html', (
         f'<!DOCTYPE html>\n<html lang="{escape(language)}"><head><meta charset="utf-8">'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">'
         f'<title>{escape(title)}</title><style>{_STYLE}</style></head>\n'
-        f'<body><main>{body}</main>\n<footer>{lines}</footer></body></html>\n'))
+        f'<body><main>{body}</main>\n<footer>{lines}</footer></body></html>\n')
 
 
 def _filled(text: str, values: Mapping[str, str]) -> str:

@@ -132,13 +132,11 @@ class DeskPages:
 
         Of a silent page nothing is known but `silent_s`, the time since it was heard.
         """
-        state: dict[str, object] = {'connected': self._used is not None,
-                                    'open': len(self._participants)}
-        if not self._is_silent:
-            return {**state, **self._told}
-        told = {'silent_s': round(self.desk.clock_s() - self.desk.heard_s)}
-        return {**state, **told, **{name: value for name, value in self._told.items()
-                                    if name == 'error'}}
+        told = self._told
+        if self._is_silent:
+            told = {'silent_s': round(self.desk.clock_s() - self.desk.heard_s),
+                    **{name: value for name, value in told.items() if name == 'error'}}
+        return {'connected': self._used is not None, 'open': len(self._participants), **told}
 
     @property
     def _is_silent(self) -> bool:
@@ -179,7 +177,9 @@ class DeskPages:
                 self.desk.heard_s = self.desk.clock_s()
                 if message.round_trip_ms is not None:
                     self.desk.hear_round_trip(message.round_trip_ms)
-                self._hear(message.model_dump(exclude={'type', 't'}, exclude_none=True))
+                told = message.model_dump(exclude={'type', 't'}, exclude_none=True)
+                self._is_due = self._is_due or told != self._told
+                self._told = told
             self._answer(client, message)
             return
         if client is self._used:
@@ -235,11 +235,6 @@ class DeskPages:
                 self.desk.end(message.reason)
             case Hold():
                 self.desk.hold(message.held)
-
-    def _hear(self, told: dict[str, object]) -> None:
-        if told != self._told:
-            self._told = told
-            self._is_due = True
 
     def _changed(self) -> None:
         self._is_due = True

@@ -215,10 +215,10 @@ def _add_pages(app: web.Application, desk: Desk, access: Access,
         if item is None or not isinstance(item.what, Page) or not item.what.consent:
             return web.Response(status=404, text='No consent is asked for now.\n')
         study = desk.session.study
-        made = consent_copy(study, item.what, language, desk.session.participant, desk.clock_s(),
-                            words_of(study, language))
-        return web.Response(text=made.html, content_type='text/html', headers={
-            hdrs.CONTENT_DISPOSITION: f'attachment; filename="{made.name}"'})
+        name, html = consent_copy(study, item.what, language, desk.session.participant,
+                                  desk.clock_s(), words_of(study, language))
+        return web.Response(text=html, content_type='text/html', headers={
+            hdrs.CONTENT_DISPOSITION: f'attachment; filename="{name}"'})
 
     async def static(request: web.Request) -> web.Response:
         return file_answer(request, table.get(request.path))
