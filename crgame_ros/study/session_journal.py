@@ -12,11 +12,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import get_origin, get_type_hints, IO, Literal, Self, TypedDict
 
-from crgame_ros.errors import InputError, short
+from crgame_ros.errors import InputError, refusing, short
 from crgame_ros.study.question import Answer
 from crgame_ros.whole_file import sync_folder
 
 JOURNAL = 'journal.jsonl'
+_ELSEWHERE = 'choose a folder that can be written, on a disk with room'
 # The reason for ending a session without consent.
 DECLINED = 'consent was not given'
 
@@ -109,19 +110,18 @@ class SessionJournal:
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / JOURNAL
-        try:
+        with refusing('cannot be written', self.path, _ELSEWHERE):
             folder.mkdir(parents=True, exist_ok=True)
             self._file: IO[bytes] = self.path.open('a+b', buffering=0)
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            try:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                self._file.close()
+                raise InputError('this participant takes part already, in another process',
+                                 str(folder), 'end that one first, or name another participant'
+                                 ) from error
             sync_folder(folder)
             sync_folder(folder.parent)
-        except BlockingIOError as error:
-            self._file.close()
-            raise InputError('this participant takes part already, in another process',
-                             str(folder), 'end that one first, or name another participant'
-                             ) from error
-        except OSError as error:
-            raise _refusal(self.path, error) from error
         self.entries = list(self._recovered())
 
     def __enter__(self) -> Self:
@@ -139,16 +139,17 @@ class SessionJournal:
         """
         line = json.dumps(entry, ensure_ascii=False, allow_nan=False) + '\n'
         size = os.fstat(self._file.fileno()).st_size
-        try:
-            left = line.encode('utf-8', 'surrogatepass')
-            while left:
-                left = left[self._file.write(left):]
-            os.fsync(self._file.fileno())
-        except OSError as error:
-            # Nothing of a refused entry stays.
-            with suppress(OSError):
-                self._file.truncate(size)
-            raise _refusal(self.path, error) from error
+        with refusing('cannot be written', self.path, _ELSEWHERE):
+            try:
+                left = line.encode('utf-8', 'surrogatepass')
+                while left:
+                    left = left[self._file.write(left):]
+                os.fsync(self._file.fileno())
+            except OSError:
+                # Nothing of a refused entry stays.
+                with suppress(OSError):
+                    self._file.truncate(size)
+                raise
         self.entries.append(json.loads(line))
 
     def close(self) -> None:
@@ -235,8 +236,3 @@ def chosen_language(entries: Sequence[JournalEntry]) -> str | None:
     """Return the language that a participant chose last; None before a choice."""
     chosen = first_of(reversed(entries), SessionEvent.LANGUAGE)
     return None if chosen is None else chosen['language']
-
-
-def _refusal(path: Path, error: OSError) -> InputError:
-    return InputError(f'cannot be written ({error.strerror})', str(path),
-                      'choose a folder that can be written, on a disk with room')
