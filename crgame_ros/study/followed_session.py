@@ -191,20 +191,14 @@ def field_answers(items: Iterable[SessionItem], answers: Mapping[str, Answers]) 
     return next((answers.get(item.id, {}) for item in items if isinstance(item.what, Fields)), {})
 
 
-def _asked_in(study: StudyFile, item: SessionItem, given: Answers,
-              fields: Answers) -> tuple[Question, ...]:
-    """Return the questions of an item that were asked, by the answers to it and to the fields."""
-    return asked_of(questions_of(study, item), given,
-                    None if isinstance(item.what, Fields) else fields)
-
-
 def failed_checks(study: StudyFile, items: Iterable[SessionItem],
                   answers: Mapping[str, Answers]) -> list[str]:
     """Return the attention checks that failed, as item and question."""
     items = tuple(items)
     fields = field_answers(items, answers)
     return [f'{item.id}: {question.name}' for item in items if item.id in answers
-            for question in _asked_in(study, item, answers[item.id], fields)
+            for question in asked_of(questions_of(study, item), answers[item.id],
+                                     None if isinstance(item.what, Fields) else fields)
             if question.failed(answers[item.id].get(question.name))]
 
 

@@ -14,8 +14,9 @@ from crgame_ros.study.trial_plan import (
     drive_seed,
     plan_trials,
     PlannedTrial,
+    settings_in,
 )
-from crgame_ros.study.trial_settings import drawn, laid, seated, TrialSettings
+from crgame_ros.study.trial_settings import drawn, TrialSettings
 
 
 @dataclass(frozen=True)
@@ -89,10 +90,11 @@ def is_driven(item: SessionItem) -> bool:
 
 
 def _seated(item: SessionItem, member: int) -> SessionItem:
+    """Return an item for one of several participants in a drive, numbered from 0 on."""
     settings, what = settings_of(item), item.what
-    if settings is None:
+    if settings is None or settings.seats is None:
         return item
-    own = seated(settings, member)
+    own = replace(settings, seat=settings.seats[member])
     if isinstance(what, PlannedTrial):
         return replace(item, what=replace(what, condition=replace(what.condition, settings=own)))
     assert isinstance(what, PracticeDrives)
@@ -126,8 +128,8 @@ def drives_of(study: StudyFile) -> Iterator[tuple[str, TrialSettings]]:
         name = f'{group}: {block.name}' if group else block.name
         conditions = conditions_of(study, block, group)
         if block.practice is not None:
-            yield f'{name}: practice', placed(_practice_settings(study, block, block.practice,
-                                                                 group), conditions[0].settings)
+            settings = settings_in(study, block, group, block.practice.settings)
+            yield f'{name}: practice', placed(settings, conditions[0].settings)
         for condition in conditions:
             yield f'{name}: {condition.name}', condition.settings
 
@@ -139,16 +141,11 @@ def placed(settings: TrialSettings, trial: TrialSettings) -> TrialSettings:
     return replace(settings, game=trial.game, scenario=trial.scenario)
 
 
-def _practice_settings(study: StudyFile, block: Block, practice: Practice,
-                       group: str) -> TrialSettings:
-    return laid(study.settings, block.settings, study.group_settings(group), practice.settings)
-
-
 def _block(study: StudyFile, block: Block, place: int, group: str,
            trials: list[PlannedTrial]) -> Iterator[SessionItem]:
     yield from _steps(f'{block.name}/before', block.before, group=group)
     if block.practice is not None:
-        settings = drawn(_practice_settings(study, block, block.practice, group),
+        settings = drawn(settings_in(study, block, group, block.practice.settings),
                          f'{drive_seed(study, place, group)} practice {block.name}')
         if trials:
             settings = placed(settings, trials[0].condition.settings)

@@ -67,9 +67,14 @@ def conditions_of(study: StudyFile, block: Block, group: str = '') -> tuple[Cond
     return tuple(
         Condition(tuple((factor.name, level) for factor, level in
                         zip(factors, levels, strict=True)),
-                  laid(study.settings, block.settings, study.group_settings(group),
-                       *(level.settings for level in levels)))
+                  settings_in(study, block, group, *(level.settings for level in levels)))
         for levels in product(*(factor.levels for factor in factors)))
+
+
+def settings_in(study: StudyFile, block: Block, group: str,
+                *inner: TrialSettings) -> TrialSettings:
+    """Return settings of a block's trials in a group, over all that are around them."""
+    return laid(study.settings, block.settings, study.group_settings(group), *inner)
 
 
 class BlockStaircases:

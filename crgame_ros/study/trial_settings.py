@@ -109,11 +109,6 @@ def tasks_over(outer: tuple[TaskSpec, ...], inner: tuple[TaskSpec, ...]) -> tupl
     return (*(task for task in outer if task.name not in names), *inner)
 
 
-def seated(settings: TrialSettings, member: int) -> TrialSettings:
-    """Return the settings for one of several participants in a drive, numbered from 0 on."""
-    return settings if settings.seats is None else replace(settings, seat=settings.seats[member])
-
-
 NOTHING = TrialSettings()
 EACH = 'each'
 # The default settings.
