@@ -15,7 +15,7 @@ from crgame_ros.schema.reading import read
 from crgame_ros.study.answer_condition import Exclusion
 from crgame_ros.study.elsewhere import Elsewhere
 from crgame_ros.study.groups import Groups
-from crgame_ros.study.local_text import BESIDE, LocalText, MarkdownFile, Name, Text
+from crgame_ros.study.local_text import BESIDE, check_known, LocalText, MarkdownFile, Name, Text
 from crgame_ros.study.planned_analysis import Comparison, PlannedAnalysis
 from crgame_ros.study.quality import QualityBounds
 from crgame_ros.study.question import check_conditions, Question
@@ -283,16 +283,13 @@ class StudyFile:
 
     def check(self) -> None:
         """Refuse what names factors, fields, questions or groups that are not there."""
-        known = {factor.name for factor in self.factors}
         for block in self.blocks:
             if block.name in ('before', 'after'):
                 raise InputError('has the name of the steps around all blocks',
                                  f'blocks: {block.name}', 'give it another name')
             for name in block.factors or ():
-                if name not in known:
-                    raise InputError(f'names the factor "{name}", which is not there',
-                                     f'blocks: {block.name}',
-                                     f'name {", ".join(sorted(known)) or "none"}')
+                check_known('factor', name, (factor.name for factor in self.factors),
+                            f'blocks: {block.name}')
             if block.staircase is not None:
                 block.staircase.check_factor(self.factors_of(block), f'blocks: {block.name}')
         names = [block.name for block in self.blocks]
@@ -302,7 +299,10 @@ class StudyFile:
                                  f'name {", ".join(names)}')
         check_conditions(self.fields, are_fields=True)
         self._check_groups()
-        self._check_exclusions()
+        for number, rule in enumerate(self.exclude):
+            if rule.when is not None and rule.when.field is not None:
+                check_known('field', rule.when.field, (field.name for field in self.fields),
+                            f'exclude[{number}]')
         self.analysis.check_factors(self.all_factors, self.between)
         self._check_compared()
 
@@ -342,15 +342,6 @@ class StudyFile:
         """Return the steps between drives: those around all blocks, then those of each."""
         return (*self.before, *self.after, *(entry for block in self.blocks for entry in (
             *block.before, *block.after_trial, *block.after)))
-
-    def _check_exclusions(self) -> None:
-        known = {field.name for field in self.fields}
-        for number, rule in enumerate(self.exclude):
-            name = None if rule.when is None else rule.when.field
-            if name is not None and name not in known:
-                raise InputError(f'names the field "{name}", which is not there',
-                                 f'exclude[{number}]',
-                                 f'name {", ".join(sorted(known)) or "none"}')
 
     @property
     def is_adaptive(self) -> bool:

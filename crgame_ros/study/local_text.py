@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names in a study, and displayed texts in its languages."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -60,6 +60,19 @@ class LocalText:
         """Return whether the text is missing in a language, so that another one is shown."""
         return bool(self.by_language) and not {language, ''} & {
             code for code, _ in self.by_language}
+
+
+def check_known(noun: str, name: str, known: Iterable[str], where: str) -> None:
+    """
+    Refuse a name that is not among those that are there.
+
+    :param noun: what has the name, such as a factor.
+    :raises InputError: that lists the others.
+    """
+    names = sorted(known)
+    if name not in names:
+        raise InputError(f'names the {noun} "{name}", which is not there', where,
+                         f'name {", ".join(names) or "none"}')
 
 
 class _LocalTextMark(Special):

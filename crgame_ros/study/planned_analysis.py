@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.marks import Listed, Within
-from crgame_ros.study.local_text import ColumnName
+from crgame_ros.study.local_text import check_known, ColumnName
 from crgame_ros.study.trial_settings import Factor
 
 Alternative = Literal['two-sided', 'less', 'greater']
@@ -101,9 +101,7 @@ class PlannedAnalysis:
         known = {factor.name: factor for factor in factors}
         for number, comparison in enumerate(self.comparisons):
             where = f'analysis: comparisons[{number}]'
-            if comparison.factor not in known:
-                raise InputError(f'names the factor "{comparison.factor}", which is not there',
-                                 where, f'name {", ".join(sorted(known)) or "none"}')
+            check_known('factor', comparison.factor, known, where)
             comparison.check_levels(known[comparison.factor], where)
             if comparison.factor == between and comparison.sd_of == 'trial':
                 raise InputError('has "sd_of: trial" between groups', where,
