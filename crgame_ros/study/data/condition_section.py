@@ -139,6 +139,14 @@ def _t(freedom: int) -> float:
     return float(t.ppf(0.5 + LEVEL / 2.0, freedom))
 
 
+def grid_marks(ticks: Sequence[float], y: Callable[[float], float], left: int,
+               right: int) -> list[str]:
+    """Draw the lines of a plot's scale from left to right, each with its number."""
+    return [f'<line class="grid" x1="{left}" x2="{right}" y1="{y(tick):.1f}" '
+            f'y2="{y(tick):.1f}"/><text class="tick" x="{left - 6}" y="{y(tick) + 4:.1f}">'
+            f'{tick_text(tick)}</text>' for tick in ticks]
+
+
 def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int,
                   bounds: tuple[float, float] = _UNBOUND) -> str:
     """
@@ -156,9 +164,7 @@ def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int,
         return _TOP + (high - value) / (high - low) * _PLOT
 
     wide = (WIDTH - _LEFT) / len(conditions)
-    marks = [f'<line class="grid" x1="{_LEFT}" x2="{WIDTH}" y1="{y(tick):.1f}" '
-             f'y2="{y(tick):.1f}"/><text class="tick" x="{_LEFT - 6}" y="{y(tick) + 4:.1f}">'
-             f'{tick_text(tick)}</text>' for tick in ticks]
+    marks = grid_marks(ticks, y, _LEFT, WIDTH)
     # A condition is labelled by its levels, one per line.
     lines = max(each.condition.count('/') + 1 for each in conditions)
     for place, each in enumerate(conditions):

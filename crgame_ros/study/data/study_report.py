@@ -18,7 +18,6 @@ from crgame_ros.analysis.report.section import (
     plain,
     Section,
     table,
-    tick_text,
 )
 from crgame_ros.errors import InputError
 from crgame_ros.study.analysis.mixed_model import fit_models, missing_extra, MixedModel
@@ -29,13 +28,12 @@ from crgame_ros.study.analysis.planned_tests import (
     UnpairedTest,
     used_rows,
 )
-from crgame_ros.study.data.condition_section import condition_section
+from crgame_ros.study.data.condition_section import condition_section, grid_marks
 from crgame_ros.study.data.conducted_study import Part
 from crgame_ros.study.data.paper_section import paper_section
 from crgame_ros.study.data.preregistration import check_measures, method_of
 from crgame_ros.study.data.session_tables import counted_tracks, STAIRCASES
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
-from crgame_ros.study.file import StudyFile
 from crgame_ros.study.planned_analysis import HYPOTHESES
 from crgame_ros.study.staircase import StaircaseTrial, Track
 from crgame_ros.whole_file import write_text
@@ -272,9 +270,7 @@ def _track_svg(track: Track, words: str) -> str:
     def x(place: int) -> float:
         return _LEFT + 12 + (place / (count - 1)) * (_WIDTH - _LEFT - 24)
 
-    marks = [f'<line class="grid" x1="{_LEFT}" x2="{_WIDTH}" y1="{y(tick):.1f}" '
-             f'y2="{y(tick):.1f}"/><text class="tick" x="{_LEFT - 6}" y="{y(tick) + 4:.1f}">'
-             f'{tick_text(tick)}</text>' for tick in ticks]
+    marks = grid_marks(ticks, y, _LEFT, _WIDTH)
     marks += [f'<text class="trial" x="{x(place):.1f}" y="{_TOP + _PLOT + 22}">{place + 1}</text>'
               for place in sorted({0, len(trials) - 1})]
     threshold = track.threshold
@@ -316,13 +312,10 @@ def _planned_section(data: StudyData) -> str:
     rows = [trial.row for trial in data.trials]
     tests = planned_tests(study, rows, data.factor_columns)
     used = used_rows(study, rows)
-    return _method(study, len(rows), len(used)) + _tests(data, tests) + _effects(tests) \
+    left_out = '' if len(used) == len(rows) else \
+        f' {len(rows) - len(used)} of {len(rows)} trials are left out.'
+    return note(plain(method_of(study) + left_out)) + _tests(data, tests) + _effects(tests) \
         + _models(data, used)
-
-
-def _method(study: StudyFile, trials: int, used: int) -> str:
-    left_out = '' if used == trials else f' {trials - used} of {trials} trials are left out.'
-    return note(plain(method_of(study) + left_out))
 
 
 def _tests(data: StudyData, tests: Sequence[PlannedTest]) -> str:
