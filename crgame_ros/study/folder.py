@@ -181,7 +181,6 @@ class StudyFolder:
         """
         Store the study's files, or check that they still equal the stored ones.
 
-        :param file: of the study.
         :param pictures: of its pages, relative to its folder.
         :raises InputError: if one has changed since, or cannot be written, or the folder has
             made data.

@@ -77,7 +77,6 @@ def followed(study: StudyFile, place: int, group: str, planned: Sequence[Session
     :param place: of the participant, in the group if there are groups.
     :param group: of the participant; empty in a study without groups.
     :param planned: the items as planned.
-    :param entries: of the journal.
     :raises InputError: if the journal has a condition that a block does not have.
     """
     tracks: dict[tuple[str, str], Track] = {}
@@ -177,11 +176,7 @@ def _told(study: StudyFile, block: Block, staircases: BlockStaircases,
 
 
 def last_answers(entries: Iterable[JournalEntry]) -> dict[str, Answers]:
-    """
-    Return the last answers of each item, by its id; none of an item that is to be repeated.
-
-    :param entries: of a journal.
-    """
+    """Return the last answers of each item, by its id; none of an item that is to be repeated."""
     return {item: entry.get('answers') or {} for item, entry in done_items(entries).items()
             if entry['entry'] == SessionEvent.FINISHED}
 

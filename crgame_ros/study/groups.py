@@ -63,7 +63,6 @@ class Stratifier:
         """
         Return all strata.
 
-        :param fields: of the study.
         :raises InputError: if the field is not one that divides people.
         """
         asked = fields.get(self.field)
@@ -162,7 +161,6 @@ class Groups:
         """
         Refuse fields that are not asked, or do not divide people.
 
-        :param fields: of the study.
         :raises InputError: naming the key.
         """
         for number, each in enumerate(self.strata):

@@ -53,7 +53,6 @@ class ParticipantSession:
     """
     The progress of a session; every step is in the journal before it counts.
 
-    :param study: its study.
     :param folder: of the participant.
     :param participant: anonymous id.
     :param place: among all participants, from 0 on; by default the participant's own, or the

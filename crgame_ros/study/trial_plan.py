@@ -81,7 +81,6 @@ class BlockStaircases:
     """
     The staircases of a block: one of each combination of the factors besides the stepped one.
 
-    :param study: the study.
     :param block: that has a staircase.
     :param group: of the participant; empty in a study without groups.
     :ivar factor: whose levels are the steps.

@@ -255,9 +255,6 @@ class SimulatedTrials:
     """
     The trials of some participants, whose measures can be drawn again and again.
 
-    :param study: their study.
-    :param people: the participants.
-    :param models: of the measures.
     :ivar measures: names of the measures.
     :ivar rows: one for each trial, as the table of trials has them.
     """

@@ -57,7 +57,6 @@ class Sessions:
     """
     The sessions that go on at once.
 
-    :param request: of the reception.
     :param say: prints one line.
     """
 

@@ -201,8 +201,6 @@ class Rider:
     """
     A participant in the drives, alone or with others.
 
-    :param session: of the participant.
-    :param conductor: of the drives.
     :ivar key: by which the cockpit recognises the participant in any browser.
     :ivar drive_watch: collects what tells whether the data of the present drive hold.
     """

@@ -48,7 +48,6 @@ class AskedQuestions:
     """
     All questionnaires of a study, with the points at which they are asked.
 
-    :param study: the study.
     :ivar after_trials: by the columns' prefix, those that come after trials.
     :ivar else_where: all others, likewise.
     :raises InputError: if a questionnaire cannot be read.

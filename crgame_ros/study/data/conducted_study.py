@@ -308,7 +308,6 @@ class ConductedStudy:
     """
     A study's folder, as created by `crgame study run`.
 
-    :param path: of the folder.
     :ivar study_path: of the copied study file.
     :raises InputError: if it holds no study.
     """

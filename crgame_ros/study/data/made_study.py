@@ -50,7 +50,6 @@ def make_study(study: StudyFile, file: Path, pictures: Sequence[str], out: Path,
     measure for each trial, as the simulation of power draws it; trials of staircases have random
     values of the drive, and no measures. There are no recordings.
 
-    :param file: of the study.
     :param pictures: of its pages.
     :param out: folder to make.
     :param effects: whether the planned effects are there, or none.

@@ -184,7 +184,6 @@ class StaircaseColumns:
     """
     The columns of the staircases in the table of participants.
 
-    :param study: the study.
     :param taken: names of other columns.
     :ivar columns: their declarations.
     """

@@ -77,7 +77,6 @@ class ParticipantsTable:
     """
     The declaration of the table, and its rows.
 
-    :param study: the study.
     :param asked: its questionnaires.
     :ivar group: column of the group; None without groups.
     """

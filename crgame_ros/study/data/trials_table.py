@@ -192,7 +192,6 @@ class TrialsTable:
     """
     The declaration of the table, and its rows.
 
-    :param folder: of the study.
     :param asked: its questionnaires.
     :ivar factors: the columns of the factors, by their names.
     """

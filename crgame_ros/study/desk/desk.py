@@ -71,7 +71,6 @@ class Desk:
     """
     Handles the requests of both pages, and calls the watcher after each change.
 
-    :param session: of the participant.
     :param drives: conducts the drives.
     :param clock_s: seconds since 1970.
     """

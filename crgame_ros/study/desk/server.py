@@ -52,7 +52,6 @@ class DeskSocket(PageSocket[ExperimenterMessage | ParticipantMessage]):
     """
     A connection of a page.
 
-    :param pages: of the desk.
     :param experimenter: whether it is an experimenter's page.
     """
 
@@ -65,7 +64,6 @@ class DeskSocket(PageSocket[ExperimenterMessage | ParticipantMessage]):
         """
         Serve the connection until it ends.
 
-        :param request: the upgrade request.
         :param name: of the page, in the log.
         """
         transport = await self.prepare(request)
