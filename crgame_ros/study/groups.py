@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 import fcntl
+from itertools import pairwise
 import os
 from pathlib import Path
 import random
@@ -52,8 +53,8 @@ class Stratifier:
     def ranges(self) -> tuple[str, ...]:
         """Return the names of the ranges between the cuts."""
         ends = [f'{cut:g}' for cut in self.cuts]
-        return (f'below {ends[0]}', *(f'{low} to below {high}' for low, high in
-                                      zip(ends, ends[1:], strict=False)), f'from {ends[-1]}')
+        return (f'below {ends[0]}', *(f'{low} to below {high}' for low, high in pairwise(ends)),
+                f'from {ends[-1]}')
 
     def stratum_of(self, answer: Any) -> str:
         """Return the stratum of an answer."""

@@ -275,17 +275,14 @@ def planned_tests(study: StudyFile, rows: Sequence[Mapping[str, object]],
     for comparison in study.analysis.comparisons:
         means = level_means(rows, columns[comparison.factor], comparison.measure)
         for pair in study.pairs_of(comparison):
-            first, second = (means.get(level, {}) for level in pair)
-            if comparison.factor == study.between:
-                found.append((comparison, pair, unpaired_test(
-                    np.array([first[person] for person in sorted(first)]),
-                    np.array([second[person] for person in sorted(second)]),
-                    comparison.alternative, alpha)))
-                continue
-            people = sorted(first.keys() & second.keys())
-            found.append((comparison, pair, paired_test(
-                np.array([first[person] for person in people]),
-                np.array([second[person] for person in people]), comparison.alternative, alpha)))
+            of_levels = [means.get(level, {}) for level in pair]
+            is_between = comparison.factor == study.between
+            both = of_levels[0].keys() & of_levels[1].keys()
+            first, second = (np.array([mean for person, mean in sorted(of_level.items())
+                                       if is_between or person in both]) for of_level in of_levels)
+            found.append((
+                comparison, pair, unpaired_test(first, second, comparison.alternative, alpha)
+                if is_between else paired_test(first, second, comparison.alternative, alpha)))
     families: dict[int | None, list[int]] = {}
     for place, (comparison, _, _) in enumerate(found):
         family = None if study.analysis.family == 'analysis' else id(comparison)

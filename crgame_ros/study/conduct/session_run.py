@@ -77,7 +77,7 @@ def conduct(request: SessionRequest, say: Callable[[str], None]) -> bool:
         if partners:
             first.join(partners)
         if _are_over(sessions):
-            say(f'{request.names} {_is(sessions)} done: nothing is left')
+            say(f'{request.names} {"are" if partners else "is"} done: nothing is left')
             return True
         for session in sessions:
             session.note_software(software_with_commit())
@@ -87,10 +87,6 @@ def conduct(request: SessionRequest, say: Callable[[str], None]) -> bool:
 
 def _are_over(sessions: Sequence[ParticipantSession]) -> bool:
     return all(session.next_item is None for session in sessions)
-
-
-def _is(people: Sequence[object]) -> str:
-    return 'is' if len(people) == 1 else 'are'
 
 
 async def _conduct(sessions: Sequence[ParticipantSession], request: SessionRequest,

@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 import json
 from pathlib import Path
 import secrets
@@ -70,7 +71,7 @@ def clean_s(status: RunStatus, seat: str, end_time_s: float) -> float:
     """Return the longest time of a drive without a contact or road departure [s]."""
     contacts, departures = _times(status, seat)
     times = [0.0, *sorted((*contacts, *departures)), end_time_s]
-    return max(later - sooner for sooner, later in zip(times, times[1:], strict=False))
+    return max(later - sooner for sooner, later in pairwise(times))
 
 
 def _times(status: RunStatus, seat: str) -> tuple[list[float], list[float]]:

@@ -97,13 +97,12 @@ def table_of_rows(declaration: TableDeclaration,
     :param rows: values by column; omitted columns count as missing.
     :raises KeyError: if a column is not declared.
     """
-    columns: dict[str, list[object]] = {column.name: [] for column in declaration.columns}
+    rows, known = list(rows), {column.name for column in declaration.columns}
     for row in rows:
-        if not row.keys() <= columns.keys():
-            raise KeyError(f'{declaration.name}: no columns {sorted(row.keys() - columns.keys())}')
-        for column in declaration.columns:
-            columns[column.name].append(_value(row.get(column.name), column.type))
-    arrays = [pa.array(columns[column.name], column.type) for column in declaration.columns]
+        if not row.keys() <= known:
+            raise KeyError(f'{declaration.name}: no columns {sorted(row.keys() - known)}')
+    arrays = [pa.array([_value(row.get(column.name), column.type) for row in rows], column.type)
+              for column in declaration.columns]
     return pa.Table.from_arrays(arrays, schema=declaration.schema)
 
 

@@ -100,17 +100,16 @@ def _item(desk: Desk, item: SessionItem) -> dict[str, object]:
                 'left_s': round(desk.break_left_s, 1)}
     if isinstance(what, DeviceCheck):
         return {'show': 'device', 'text': what.text.in_language(language)}
-    questions = {'show': 'questions', 'title': '', 'text': '', 'matrix': False, 'questions': [
+    head: dict[str, object] = {'title': '', 'text': '', 'matrix': False}
+    if isinstance(what, Questions):
+        scale = scale_of(study, what)
+        head = {'title': scale.title.in_language(language),
+                'text': scale.text.in_language(language), 'matrix': scale.matrix}
+    return {'show': 'questions', **head, 'questions': [
         _question(question, language, isinstance(what, Fields))
         for question in desk.session.questions(item)
         if isinstance(what, Fields) or question.when is None or question.when.field is None
         or holds_for(question.when, {}, desk.session.fields)]}
-    if isinstance(what, Questions):
-        scale = scale_of(study, what)
-        questions |= {'title': scale.title.in_language(language),
-                      'text': scale.text.in_language(language), 'matrix': scale.matrix}
-    assert isinstance(what, Questions | Fields)
-    return questions
 
 
 def _drive(desk: Desk, item: SessionItem) -> dict[str, object]:
@@ -155,16 +154,13 @@ def _question(question: Question, language: str, are_fields: bool) -> dict[str, 
             'kind': 'likert', 'points': kind.points, 'left': kind.left.in_language(language),
             'right': kind.right.in_language(language),
             'labels': [label.in_language(language) for label in kind.labels]}
-    if isinstance(kind, SliderQuestion):
-        return document | {
-            'kind': 'slider', 'low': kind.low, 'high': kind.high, 'step': kind.step,
-            'bare': False, 'left': kind.left.in_language(language),
-            'right': kind.right.in_language(language)}
-    if isinstance(kind, VasQuestion):
+    if isinstance(kind, SliderQuestion | VasQuestion):
         low, high = kind.bounds
         return document | {
-            'kind': 'slider', 'low': low, 'high': high, 'step': VAS_STEP, 'bare': True,
-            'left': kind.left.in_language(language), 'right': kind.right.in_language(language)}
+            'kind': 'slider', 'low': low, 'high': high,
+            'step': kind.step if isinstance(kind, SliderQuestion) else VAS_STEP,
+            'bare': isinstance(kind, VasQuestion), 'left': kind.left.in_language(language),
+            'right': kind.right.in_language(language)}
     if isinstance(kind, ChoiceQuestion):
         return document | {'kind': 'choice', 'several': kind.several, 'choices': [
             [name, text.in_language(language)] for name, text in kind.texts.items()]}
