@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Linear mixed models of trials with a random intercept of each participant, by statsmodels."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 import math
@@ -112,18 +112,6 @@ class MixedModel:
 def missing_extra() -> str:
     """Return what installs the package for models, or an empty text where it is installed."""
     return extra_install('statistics') if find_spec('statsmodels') is None else ''
-
-
-def fit_models(study: StudyFile, rows: Sequence[Mapping[str, object]],
-               columns: Mapping[str, str]) -> Iterator[MixedModel]:
-    """
-    Fit the model of each planned comparison; needs statsmodels.
-
-    :param rows: the trials that the analysis uses.
-    :param columns: of the factors, by their names.
-    """
-    for formula in model_formulas(study):
-        yield fit_model(formula, rows, columns)
 
 
 def fit_model(formula: ModelFormula, rows: Sequence[Mapping[str, object]],

@@ -71,18 +71,16 @@ class _Stream(NamedTuple):
     texts: list[list[str | None]]
 
 
-def _write_recordings(trial: CountedTrial, folder: Path, participant: str, task: str,
-                      begun_s: float) -> None:
+def _write_recordings(trial: CountedTrial, folder: Path, participant: str, task: str) -> None:
     """
     Write the streams of a trial that have a steady rate, each with a sidecar.
 
     :param folder: of the participant's files.
     :param participant: label of the participant, such as sub-P01.
     :param task: label of the study.
-    :param begun_s: zero of the participant's events [s since 1970]
     :raises InputError: if a file cannot be written.
     """
-    start_s = drive_start_s(trial.attempt) - begun_s
+    start_s = drive_start_s(trial.attempt) - trial.record.begun_at
     labels: set[str] = set()
     for stream in _streams(trial):
         if not stream.rate_hz or stream.texts:
@@ -221,7 +219,7 @@ def write_bids(data: StudyData, out: Path) -> None:
             'TaskName': task, 'TaskDescription': title, 'StimulusPresentation': {
                 'SoftwareName': 'crgame_ros', 'SoftwareVersion': __version__}, **_sidecar()})
         for trial in trials:
-            _write_recordings(trial, folder, f'sub-{labels[record.id]}', task, record.begun_at)
+            _write_recordings(trial, folder, f'sub-{labels[record.id]}', task)
 
 
 def _remove_earlier(out: Path, task: str) -> None:

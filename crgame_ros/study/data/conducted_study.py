@@ -326,13 +326,8 @@ class ConductedStudy:
         return self.path / DATA
 
     @property
-    def withdrawals(self) -> int:
-        """Return the number of participants whose data were deleted."""
-        return len(self.withdrawn_groups)
-
-    @property
     def withdrawn_groups(self) -> list[str]:
-        """Return the group of each withdrawn participant; an empty name for none."""
+        """Return the group of each participant whose data were deleted; an empty name for none."""
         log = self.path / WITHDRAWALS
         lines = log.read_text('utf-8').splitlines() if log.is_file() else ()
         return [json.loads(line).get('group', '') for line in lines]

@@ -44,7 +44,7 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
         'data_written_by': software_with_commit(),
         # As noted by the sessions: more than one if it changed during the study.
         'sessions_run_by': {record.id: record.software for record in data.records},
-        'withdrawals': folder.withdrawals,
+        'withdrawals': len(folder.withdrawn_groups),
         'groups': None if study.groups is None else {
             'factor': study.groups.name, 'names': list(study.groups.names),
             'allocation': study.groups.told},

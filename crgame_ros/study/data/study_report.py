@@ -20,7 +20,12 @@ from crgame_ros.analysis.report.section import (
     table,
 )
 from crgame_ros.errors import InputError
-from crgame_ros.study.analysis.mixed_model import fit_models, missing_extra, MixedModel
+from crgame_ros.study.analysis.mixed_model import (
+    fit_model,
+    missing_extra,
+    MixedModel,
+    model_formulas,
+)
 from crgame_ros.study.analysis.planned_tests import (
     PairedTest,
     planned_tests,
@@ -92,7 +97,7 @@ def study_html(data: StudyData) -> str:
 def _facts(data: StudyData) -> list[tuple[str, str]]:
     complete = sum(record.complete for record in data.records)
     planned = sum(row['trials_planned'] for row in _rows(data, 'participants'))
-    withdrawn = data.folder.withdrawals
+    withdrawn = len(data.folder.withdrawn_groups)
     flagged = sum(trial.row['timing_flag'] for trial in data.trials)
     made = [('made data', '<strong>nobody took part</strong>')] if data.made else []
     return [
@@ -375,9 +380,10 @@ def _models(data: StudyData, rows: Sequence[Mapping[str, object]]) -> str:
         return note(f'For mixed models, install statsmodels: <code>{plain(missing)}</code>. '
                     '<code>analysis.R</code> beside the tables has them for R.')
     html = ''
-    for model in fit_models(data.folder.study, rows, data.factor_columns):
-        formula = model.formula.text(data.factor_columns)
-        html += table(f'Mixed model: <code>{plain(formula)}</code>', (
+    for formula in model_formulas(data.folder.study):
+        model = fit_model(formula, rows, data.factor_columns)
+        text = formula.text(data.factor_columns)
+        html += table(f'Mixed model: <code>{plain(text)}</code>', (
             '', 'estimate', 'SE', '95 % interval', 'z', 'p'), list(_fixed(model)), 'numbers')
         told = f'{model.trials} trials of {model.participants} participants'
         if model.effects:
