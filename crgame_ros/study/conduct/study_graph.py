@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The graph in which participants drive: its process, links to its cockpit, its node."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 import os
 from pathlib import Path
 import signal
 import subprocess
 import sys
+from typing import Any
 
 from aiohttp import ClientError, ClientSession, ClientTimeout, CookieJar, Fingerprint
 from crgame_ros.cockpit.exposure import fingerprint
@@ -143,6 +144,15 @@ async def make_links(director: str, certificate: Path, drivers: int) -> tuple[st
     return tuple(links)
 
 
+def _popped(slot: PolledSubscription) -> Iterator[Any]:
+    """Yield the messages that have arrived, no more than the queue holds."""
+    for _ in range(_QUEUE):
+        message = slot.pop()
+        if message is None:
+            return
+        yield message
+
+
 class Director:
     """
     The controller of one graph. It is polled, and waits only in its coroutines.
@@ -187,10 +197,7 @@ class Director:
         self._read_clock()
         self._read_events()
         for slot in (self._diagnostics, *self._verdicts.values()):
-            for _ in range(_QUEUE):
-                message = slot.pop()
-                if message is None:
-                    break
+            for message in _popped(slot):
                 stamp_ns = from_time(message.header.stamp)
                 if self.game is not None and stamp_ns >= self.game.scheduler.clock_offset_ns:
                     for status in map(read_status, message.status):
@@ -258,10 +265,7 @@ class Director:
                 self.status.add_events(events.fired, self.game.scheduler.dt_s)
 
     def _read_tasks(self) -> None:
-        for _ in range(_QUEUE):
-            message = self._tasks.pop()
-            if message is None:
-                return
+        for message in _popped(self._tasks):
             # Another program may publish a malformed document there.
             with suppress(InputError):
                 log = TASK_LOG.read(message.data)

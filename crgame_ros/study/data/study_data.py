@@ -112,6 +112,7 @@ class ParticipantsTable:
     def row(self, record: ParticipantRecord) -> dict[str, object]:
         """Return a participant's row."""
         ended = first_of(record.entries, SessionEvent.ENDED)
+        exclusion = record.exclusion or {}
         runs = {Path(entry['run']).parts[:2] for entry in record.entries
                 if entry.get('run')}
         row = {'participant': record.id, 'place': record.place + 1, 'language': record.language,
@@ -121,7 +122,9 @@ class ParticipantsTable:
                or None, 'sessions': len(runs),
                'trials': len(record.counted), 'trials_planned': record.trials_planned,
                'complete': record.complete, **_consent(record),
-               **_excluded(record), **self._stepped.values(record),
+               'excluded': record.exclusion is not None,
+               'excluded_reason': exclusion.get('reason'), 'excluded_at': exclusion.get('item'),
+               'attention_failed': len(record.failed_checks), **self._stepped.values(record),
                'end_reason': None if ended is None else ended.get('reason')}
         if self.group is not None and record.allocation is not None:
             row |= {self.group.name: record.group,
@@ -134,12 +137,6 @@ class ParticipantsTable:
             elif answered.item.trial is None and scale is not None:
                 row |= scale.values(answered.answers)
         return row
-
-
-def _excluded(record: ParticipantRecord) -> dict[str, object]:
-    exclusion = record.exclusion or {}
-    return {'excluded': record.exclusion is not None, 'excluded_reason': exclusion.get('reason'),
-            'excluded_at': exclusion.get('item'), 'attention_failed': len(record.failed_checks)}
 
 
 def _consent(record: ParticipantRecord) -> dict[str, object]:

@@ -20,12 +20,7 @@ from crgame_ros.analysis.report.section import (
     table,
 )
 from crgame_ros.errors import InputError
-from crgame_ros.study.analysis.mixed_model import (
-    fit_model,
-    missing_extra,
-    MixedModel,
-    model_formulas,
-)
+from crgame_ros.study.analysis.mixed_model import fit_model, missing_extra, model_formulas
 from crgame_ros.study.analysis.planned_tests import (
     PairedTest,
     planned_tests,
@@ -384,7 +379,10 @@ def _models(data: StudyData, rows: Sequence[Mapping[str, object]]) -> str:
         model = fit_model(formula, rows, data.factor_columns)
         text = formula.text(data.factor_columns)
         html += table(f'Mixed model: <code>{plain(text)}</code>', (
-            '', 'estimate', 'SE', '95 % interval', 'z', 'p'), list(_fixed(model)), 'numbers')
+            '', 'estimate', 'SE', '95 % interval', 'z', 'p'), [
+                (plain(each.name), _value(each.value), _value(each.error),
+                 f'[{_value(each.low)}; {_value(each.high)}]', number(each.z, 2), _p(each.p))
+                for each in model.effects], 'numbers')
         told = f'{model.trials} trials of {model.participants} participants'
         if model.effects:
             told += (f'; standard deviations: participants {_value(model.participant_sd)}, '
@@ -398,12 +396,6 @@ def _models(data: StudyData, rows: Sequence[Mapping[str, object]]) -> str:
         'factor. z and p are by the normal distribution, which is too sure with few participants: '
         '<code>analysis.R</code> beside the tables fits the same model by lme4, and tests it with '
         'Satterthwaite’s degrees of freedom.')
-
-
-def _fixed(model: MixedModel) -> Iterator[Sequence[str]]:
-    for each in model.effects:
-        yield (plain(each.name), _value(each.value), _value(each.error),
-               f'[{_value(each.low)}; {_value(each.high)}]', number(each.z, 2), _p(each.p))
 
 
 def _p(value: float) -> str:

@@ -54,8 +54,9 @@ def read_tree(study: StudyFile, page: Page, language: str) -> tuple[Node, ...]:
         raise InputError('cannot be read', str(file), 'write it as UTF-8') from error
     if len(content) > MOST_BYTES:
         raise InputError(f'is longer than {MOST_BYTES} bytes', str(file), 'make it shorter')
-    tree = SyntaxTreeNode(_parser().parse(text))
-    return tuple(_nodes(tree.children))
+    # HTML is off: it is shown as text.
+    parser = MarkdownIt('commonmark', {'html': False}).enable(['table', 'strikethrough'])
+    return tuple(_nodes(SyntaxTreeNode(parser.parse(text)).children))
 
 
 def pictures_of(study: StudyFile) -> tuple[str, ...]:
@@ -95,11 +96,6 @@ def picture(study: StudyFile, name: str) -> PageFile | None:
     except (OSError, ValueError):
         return None
     return PageFile(body, PICTURES[path.suffix.lower()])
-
-
-def _parser() -> MarkdownIt:
-    # HTML is off: it is shown as text.
-    return MarkdownIt('commonmark', {'html': False}).enable(['table', 'strikethrough'])
 
 
 def _nodes(nodes: list[SyntaxTreeNode]) -> Iterator[Node]:
