@@ -7,7 +7,6 @@ import random
 from typing import Literal
 
 OrderKind = Literal['williams', 'random', 'given']
-ORDERS: tuple[OrderKind, ...] = ('williams', 'random', 'given')
 
 
 def williams_rows(count: int) -> list[list[int]]:

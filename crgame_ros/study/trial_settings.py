@@ -110,7 +110,6 @@ def tasks_over(outer: tuple[TaskSpec, ...], inner: tuple[TaskSpec, ...]) -> tupl
 
 
 NOTHING = TrialSettings()
-EACH = 'each'
 # The default settings.
 STANDARD = TrialSettings(perception='own', traffic='own', seed=0, view='driver', map=False,
                          plans=False, names=False, sound=True)
@@ -155,7 +154,7 @@ def drawn(settings: TrialSettings, drive: str) -> TrialSettings:
 
     :param drive: its unique name in the study; equal names give equal seeds everywhere.
     """
-    if settings.seed != EACH:
+    if settings.seed != 'each':
         return settings
     return replace(settings, seed=random.Random(drive).getrandbits(31))
 

@@ -6,13 +6,13 @@ from collections import Counter
 from itertools import pairwise
 import subprocess
 import sys
-from typing import Any
+from typing import Any, get_args
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
 from crgame_ros.study.file import StudyFile
 from crgame_ros.study.session_script import PracticeDrives, session_of
-from crgame_ros.study.trial_order import order_of, ORDERS, rows_of, williams_rows
+from crgame_ros.study.trial_order import order_of, OrderKind, rows_of, williams_rows
 from crgame_ros.study.trial_plan import blocks_of, plan_trials
 import pytest
 
@@ -30,7 +30,7 @@ def test_every_condition_follows_every_other_equally_often(count: int, seed: int
     assert set(places.values()) == {rows // count}
 
 
-@pytest.mark.parametrize('kind', ORDERS)
+@pytest.mark.parametrize('kind', get_args(OrderKind))
 def test_every_order_has_every_condition_once(kind: str) -> None:
     for count in range(1, 9):
         for place in range(20):

@@ -76,9 +76,9 @@ def power_of(study: StudyFile, counts: Sequence[int], runs: int, seed: int,
 def _told(study: StudyFile, test: PlannedTest) -> tuple[str, str]:
     """Return the name of a test, and its stated effect."""
     comparison, (first, second) = test.comparison, test.pair
-    unit = 'sd of the participants in a group' if comparison.factor == study.between \
+    unit = f"in the measure's unit, sd {comparison.sd:g}" if comparison.sd is not None \
+        else 'sd of the participants in a group' if comparison.factor == study.between \
         else 'sd of the differences'
-    unit = unit if comparison.sd is None else f"in the measure's unit, sd {comparison.sd:g}"
     side = {'two-sided': '', 'greater': ' > 0', 'less': ' < 0'}[comparison.alternative]
     return (f'{comparison.measure}, {comparison.factor}: {second} - {first}{side}',
             f'{comparison.effect:g} {unit}')
