@@ -93,8 +93,9 @@ def _journal_rows(record: ParticipantRecord) -> Iterator[dict[str, Any]]:
     attempts = {(each.item, each.attempt): each for each in record.attempts}
     running: TrialAttempt | None = None
     for entry in record.entries:
-        kind, item = entry['entry'], record.items.get(entry.get('item', ''))
-        driven = item is not None and isinstance(item.what, PlannedTrial)
+        kind, name = entry['entry'], entry.get('item', '')
+        item = record.items.get(name)
+        trial = item.what if item is not None and isinstance(item.what, PlannedTrial) else None
         if kind == SessionEvent.OPENED:
             # A drive before it was lost with its program.
             running = None
@@ -103,11 +104,11 @@ def _journal_rows(record: ParticipantRecord) -> Iterator[dict[str, Any]]:
                'name': entry.get('name') or entry.get('outcome') or entry.get('group') or None,
                'text': entry.get('text') or entry.get('reason') or None,
                'recording': entry.get('run') or None, 'time_s': entry.get('time_s')}
-        if driven and item is not None and isinstance(item.what, PlannedTrial):
-            row['trial'] = item.what.number
+        if trial is not None:
+            row['trial'] = trial.number
             if kind == SessionEvent.STARTED:
-                running = attempts.get((item.id, int(entry.get('attempt', 1))))
-            row['attempt'] = running.attempt if running and running.item == item.id else None
+                running = attempts.get((name, int(entry.get('attempt', 1))))
+            row['attempt'] = running.attempt if running and running.item == name else None
             if kind == SessionEvent.FINISHED:
                 row['time_s'] = entry.get('end_time_s')
         elif item is not None:
@@ -118,7 +119,8 @@ def _journal_rows(record: ParticipantRecord) -> Iterator[dict[str, Any]]:
         if kind == SessionEvent.PRACTISED:
             row['text'] = 'good' if entry.get('good') else 'not good'
         yield row
-        if driven and kind in (SessionEvent.FINISHED, SessionEvent.ABORTED, SessionEvent.SKIPPED):
+        if trial is not None and kind in (SessionEvent.FINISHED, SessionEvent.ABORTED,
+                                          SessionEvent.SKIPPED):
             running = None
 
 

@@ -188,25 +188,19 @@ def participant_flow(data: StudyData) -> list[tuple[str, dict[str, int]]]:
     :return: words, and the number in each group by its name; an empty name stands for people
         without a group.
     """
-    flow: dict[str, Counter[str]] = {}
-
-    def count(words: str, group: str) -> None:
-        flow.setdefault(words, Counter())[group] += 1
-
     rules = [record.exclusion['reason'] for record in data.records if record.exclusion is not None]
-    # The order of the table.
-    for words in ('began', 'excluded', *(f'excluded: {rule}' for rule in dict.fromkeys(rules)),
-                  'did not give consent', 'session ended early', 'withdrew, data deleted',
-                  'under way', 'completed'):
-        flow[words] = Counter()
+    # In the order of the table.
+    flow: dict[str, Counter[str]] = {words: Counter() for words in (
+        'began', 'excluded', *(f'excluded: {rule}' for rule in rules), 'did not give consent',
+        'session ended early', 'withdrew, data deleted', 'under way', 'completed')}
     for record in data.records:
-        count('began', record.group)
-        count(_PARTS[record.part], record.group)
+        flow['began'][record.group] += 1
+        flow[_PARTS[record.part]][record.group] += 1
         if record.exclusion is not None:
-            count(f'excluded: {record.exclusion["reason"]}', record.group)
+            flow[f'excluded: {record.exclusion["reason"]}'][record.group] += 1
     for group in data.folder.withdrawn_groups:
-        count('began', group)
-        count('withdrew, data deleted', group)
+        flow['began'][group] += 1
+        flow['withdrew, data deleted'][group] += 1
     return [(words, dict(counts)) for words, counts in flow.items()]
 
 
