@@ -10,7 +10,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.study.file import Block, StudyFile
 from crgame_ros.study.staircase import follow, ToldTrial, Track
 from crgame_ros.study.trial_order import order_of, rows_of
-from crgame_ros.study.trial_settings import drawn, Factor, laid, Level, TrialSettings
+from crgame_ros.study.trial_settings import drawn, Factor, laid, TrialSettings
 
 
 @dataclass(frozen=True)
@@ -18,22 +18,17 @@ class Condition:
     """
     A combination of factor levels.
 
-    :param levels: one of each factor of the block, by the factor's name.
+    :param levels: names of the block's factors, each with that of its level.
     :param settings: of its trials, which override those of study and block.
     """
 
-    levels: tuple[tuple[str, Level], ...]
+    levels: tuple[tuple[str, str], ...]
     settings: TrialSettings
 
     @property
     def name(self) -> str:
         """Return its name, made of its levels."""
-        return '/'.join(self.level_names.values()) or 'all'
-
-    @property
-    def level_names(self) -> dict[str, str]:
-        """Return the names of its levels, by those of the factors."""
-        return {factor: level.name for factor, level in self.levels}
+        return '/'.join(level for _, level in self.levels) or 'all'
 
 
 @dataclass(frozen=True)
@@ -65,7 +60,7 @@ def conditions_of(study: StudyFile, block: Block, group: str = '') -> tuple[Cond
     """
     factors = study.factors_of(block)
     return tuple(
-        Condition(tuple((factor.name, level) for factor, level in
+        Condition(tuple((factor.name, level.name) for factor, level in
                         zip(factors, levels, strict=True)),
                   settings_in(study, block, group, *(level.settings for level in levels)))
         for levels in product(*(factor.levels for factor in factors)))
@@ -99,7 +94,7 @@ class BlockStaircases:
             others = replace(condition, levels=tuple(
                 each for each in condition.levels if each[0] != name))
             index = whose.setdefault(others.name, len(whose))
-            self._conditions[index, steps.index(condition.level_names[name])] = condition
+            self._conditions[index, steps.index(dict(condition.levels)[name])] = condition
         self.names = tuple(whose)
         self._places = {each.name: at for at, each in self._conditions.items()}
 

@@ -247,7 +247,7 @@ def _trial_sd(study: StudyFile, comparison: Comparison,
 
 def _root(study: StudyFile, comparison: Comparison, trials: tuple[PlannedTrial, ...]) -> float:
     """Return the standard deviation of a difference of means over that of a trial."""
-    counts = Counter(trial.condition.level_names.get(comparison.factor) for trial in trials)
+    counts = Counter(dict(trial.condition.levels).get(comparison.factor) for trial in trials)
     return math.sqrt(sum(1.0 / max(1, counts[level]) for level in study.pairs_of(comparison)[0]))
 
 
@@ -270,7 +270,7 @@ class SimulatedTrials:
             own = {} if study.between is None else {study.between: person.group}
             for trial in _compared_trials(study, person.place, person.group):
                 numbers.append(number)
-                levels.append(trial.condition.level_names | own)
+                levels.append(dict(trial.condition.levels) | own)
                 self.rows.append({'participant': person.id, 'trial': trial.number,
                                   'block': trial.block, **levels[-1]})
         self._people = np.array(numbers, dtype=np.intp)

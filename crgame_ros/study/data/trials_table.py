@@ -214,7 +214,7 @@ class TrialsTable:
             'participant': record.id, 'trial': trial.number, 'place': record.place + 1,
             'block': trial.block, 'place_in_block': trial.place, 'repetition': trial.repetition,
             'condition': trial.condition.name,
-            **{self.factors[name].name: level.name for name, level in trial.condition.levels},
+            **{self.factors[name].name: level for name, level in trial.condition.levels},
             **self._grouped(record), **_stepped(record, trial),
             **self._drive(record, attempt), 'problem': problem or None}
         if run is not None:
