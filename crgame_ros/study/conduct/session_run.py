@@ -144,21 +144,17 @@ async def _until_over(desks: Sequence[Desk], driving: asyncio.Task[None], stop: 
     :param absent_s: do not wait any longer for a participant whose page is silent [s].
     :return: the id of that participant; empty if all were there.
     """
-    stopped = asyncio.create_task(stop.wait())
-    try:
-        while not stop.is_set():
-            under_way = [desk for desk in desks if desk.session.next_item is not None]
-            if not under_way:
-                break
-            for desk in under_way:
-                if desk.clock_s() - desk.heard_s > absent_s:
-                    return desk.session.participant
-            if driving.done() and driving.exception() is not None:
-                # An error that no page can fix.
-                driving.result()
-            await asyncio.sleep(0.1)
-        if not stop.is_set():
-            await asyncio.wait([stopped], timeout=LINGER_S)
-        return ''
-    finally:
-        stopped.cancel()
+    while not stop.is_set():
+        under_way = [desk for desk in desks if desk.session.next_item is not None]
+        if not under_way:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(stop.wait(), LINGER_S)
+            break
+        for desk in under_way:
+            if desk.clock_s() - desk.heard_s > absent_s:
+                return desk.session.participant
+        if driving.done() and driving.exception() is not None:
+            # An error that no page can fix.
+            driving.result()
+        await asyncio.sleep(0.1)
+    return ''
