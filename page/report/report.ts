@@ -47,21 +47,16 @@ export type Draw = (node: HTMLElement, ...what: object[]) => Promise<unknown>;
     return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
   }
 
-  /** @param name of a colour */
-  function colour(name: string) {
-    return theme.getPropertyValue(`--${name}`).trim();
-  }
-
   // light-dark() is only resolved where it is used: each colour is asked of an element.
   const probe = document.createElement('span');
   probe.hidden = true;
   document.body.append(probe);
-  const theme = {
-    getPropertyValue(name: string) {
-      probe.style.color = `var(${name})`;
-      return getComputedStyle(probe).color;
-    },
-  };
+
+  /** @param name of a colour */
+  function colour(name: string) {
+    probe.style.color = `var(--${name})`;
+    return getComputedStyle(probe).color;
+  }
 
   function runOf(node: PlotNode) {
     return node.id.split('-', 1)[0];
