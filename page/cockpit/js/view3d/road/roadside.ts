@@ -55,7 +55,7 @@ class RoadPoints {
       for (const line of [left, right]) {
         const dense = densified(line, 6);
         for (let i = 0; i < dense.length; i += 2) {
-          const key = keyOf(dense[i], dense[i + 1], SIGHT_CELL_M);
+          const key = keyOf(dense[i], dense[i + 1]);
           const cell = this.#cells.get(key) ?? [];
           this.#cells.set(key, cell);
           cell.push(dense[i], dense[i + 1]);
@@ -75,8 +75,8 @@ class RoadPoints {
     const cells = Math.ceil(SIGHT_M / SIGHT_CELL_M);
     for (let column = -cells; column <= cells; column += 1) {
       for (let row = -cells; row <= cells; row += 1) {
-        const cell = this.#cells.get(keyOf(x + column * SIGHT_CELL_M, y + row * SIGHT_CELL_M,
-          SIGHT_CELL_M)) ?? [];
+        const cell = this.#cells.get(
+          keyOf(x + column * SIGHT_CELL_M, y + row * SIGHT_CELL_M)) ?? [];
         for (let i = 0; i < cell.length; i += 2) {
           const [dx, dy] = [cell[i] - x, cell[i + 1] - y];
           if (dx * cos + dy * sin > 0 && Math.hypot(dx, dy) < SIGHT_M) {
@@ -102,13 +102,13 @@ class Taken {
     for (let column = -1; column <= 1; column += 1) {
       for (let row = -1; row <= 1; row += 1) {
         const cell = this.#cells.get(
-          keyOf(x + column * SIGHT_CELL_M, y + row * SIGHT_CELL_M, SIGHT_CELL_M));
+          keyOf(x + column * SIGHT_CELL_M, y + row * SIGHT_CELL_M));
         if (cell?.some((other) => Math.hypot(other.x - x, other.y - y) < other.radius + radius)) {
           return false;
         }
       }
     }
-    const key = keyOf(x, y, SIGHT_CELL_M);
+    const key = keyOf(x, y);
     this.#cells.set(key, [...this.#cells.get(key) ?? [], { x, y, radius }]);
     return true;
   }
@@ -287,7 +287,7 @@ function beyond({ x, y, yaw }: EdgePose, distance: number): EdgePose {
   return { x: x + distance * Math.cos(yaw), y: y + distance * Math.sin(yaw), yaw };
 }
 
-/** @param cell [m] */
-function keyOf(x: number, y: number, cell: number) {
-  return `${Math.floor(x / cell)} ${Math.floor(y / cell)}`;
+/** Return the name of the cell that holds a point. */
+function keyOf(x: number, y: number) {
+  return `${Math.floor(x / SIGHT_CELL_M)} ${Math.floor(y / SIGHT_CELL_M)}`;
 }
