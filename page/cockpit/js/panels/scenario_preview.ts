@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /** A small drawing of a scenario at its beginning. */
 
-import { outlineOf } from '../outline.js';
+import { boxOf, outlineOf } from '../outline.js';
 import { colorNameOf, onThemeChange, themeColor } from '../world/palette.js';
+import { addLine, addPolygon } from '../world/polyline.js';
 
 import type { Preview } from '../api_messages.js';
 import type { Box, Scene, Shape } from '../messages.js';
@@ -104,10 +105,7 @@ function surroundings({ scene, states }: Preview, area: Area): Box {
   if (poses.length === 0) {
     return scene.bounds;
   }
-  const xs = poses.map(([x]) => x);
-  const ys = poses.map(([, y]) => y);
-  const [left, right] = [Math.min(...xs), Math.max(...xs)];
-  const [bottom, top] = [Math.min(...ys), Math.max(...ys)];
+  const [left, bottom, right, top] = boxOf(poses.flatMap(([x, y]) => [x, y]));
   const half = 0.5 * Math.max(right - left, (top - bottom) * area.width / area.height)
     + AROUND_M;
   const tall = half * area.height / area.width;
@@ -154,19 +152,6 @@ function fit(context: CanvasRenderingContext2D, area: Area, bounds: Box) {
   return scale;
 }
 
-function trace(context: CanvasRenderingContext2D, flat: number[], close = false) {
-  for (let i = 0; i + 1 < flat.length; i += 2) {
-    if (i === 0) {
-      context.moveTo(flat[i], flat[i + 1]);
-    } else {
-      context.lineTo(flat[i], flat[i + 1]);
-    }
-  }
-  if (close) {
-    context.closePath();
-  }
-}
-
 function drawRoads(context: CanvasRenderingContext2D, scene: Scene, scale: number) {
   const pixel = window.devicePixelRatio / scale;
   context.lineWidth = pixel;
@@ -176,20 +161,20 @@ function drawRoads(context: CanvasRenderingContext2D, scene: Scene, scale: numbe
   context.strokeStyle = themeColor(isThin ? 'map-road' : 'map-mark');
   for (const lanelet of scene.lanelets) {
     context.beginPath();
-    trace(context, outlineOf(lanelet), true);
+    addPolygon(context, outlineOf(lanelet), 0, 0);
     context.fill();
   }
   for (const lanelet of scene.lanelets) {
     context.beginPath();
-    trace(context, lanelet.left);
-    trace(context, lanelet.right);
+    addLine(context, lanelet.left, 0, 0);
+    addLine(context, lanelet.right, 0, 0);
     context.stroke();
   }
   context.fillStyle = themeColor('av');
   context.globalAlpha = 0.25;
   for (const polygon of scene.goals.flatMap((goal) => goal.polygons)) {
     context.beginPath();
-    trace(context, polygon, true);
+    addPolygon(context, polygon, 0, 0);
     context.fill();
   }
   context.globalAlpha = 1;
@@ -209,7 +194,7 @@ function drawBody(context: CanvasRenderingContext2D,
   context.scale(grow, grow);
   context.beginPath();
   if (shape.kind === 'polygon' && shape.vertices.length > 0) {
-    trace(context, shape.vertices, true);
+    addPolygon(context, shape.vertices, 0, 0);
   } else if (shape.kind === 'circle') {
     context.arc(0, 0, 0.5 * shape.length, 0, 2 * Math.PI);
   } else {

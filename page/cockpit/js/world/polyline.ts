@@ -115,7 +115,8 @@ export function addDashes(path: Lines, line: number[], ox: number, oy: number, d
  * @param ox subtracted from x [m]
  * @param oy subtracted from y [m]
  */
-export function addPolygon(path: Path2D, outline: number[], ox: number, oy: number) {
+export function addPolygon(path: Lines & Pick<Path2D, 'closePath'>, outline: number[], ox: number,
+  oy: number) {
   addLine(path, outline, ox, oy);
   path.closePath();
 }

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Shapes of things from above: paths in metres around the centre, x forward. */
 
+import { addPolygon } from './polyline.js';
+
 import type { Shape } from '../messages.js';
 
 export interface Look {
@@ -143,10 +145,7 @@ function block({ kind, length, width, vertices }: Shape, moves: boolean): Parts 
   if (kind === 'circle') {
     body.arc(0, 0, length / 2, 0, 2 * Math.PI);
   } else if (kind === 'polygon') {
-    for (let i = 0; i < vertices.length; i += 2) {
-      body.lineTo(vertices[i], vertices[i + 1]);
-    }
-    body.closePath();
+    addPolygon(body, vertices, 0, 0);
   } else {
     body.rect(-length / 2, -width / 2, length, width);
   }

@@ -2,22 +2,20 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The symbols on signs, drawn in a square from -1 to 1 with y down. */
 
+import { addLine } from '../../world/polyline.js';
+
 export type Context = CanvasRenderingContext2D;
 
 function fill(context: Context, points: number[]) {
   context.beginPath();
-  for (let i = 0; i < points.length; i += 2) {
-    context.lineTo(points[i], points[i + 1]);
-  }
+  addLine(context, points, 0, 0);
   context.fill();
 }
 
 function stroke(context: Context, width: number, ...points: number[]) {
   context.lineWidth = width;
   context.beginPath();
-  for (let i = 0; i < points.length; i += 2) {
-    context.lineTo(points[i], points[i + 1]);
-  }
+  addLine(context, points, 0, 0);
   context.stroke();
 }
 
