@@ -9,7 +9,6 @@ import {
   loadProfile, pedalValue, sampleOf, saveProfile, steeringValue,
 } from '../../cockpit/js/driving/gamepad_profile.js';
 import { ACTIONS } from '../../cockpit/js/driving/keyboard.js';
-import { local } from '../../cockpit/js/panels/memory.js';
 import { button } from './page_view.js';
 
 import type { DeviceDocument } from './desk_messages.js';
@@ -23,17 +22,7 @@ const MOVEMENTS: Movement[] = ['left', 'right', 'throttle', 'brake'];
 const MOVED = 0.6;
 // An axis this far from its first position was moved by the participant.
 const TOUCHED = 0.4;
-const PREFIX = 'crgame.gamepad.';
 const KEYBOARD = 'keyboard';
-
-/**
- * Return this browser's stored calibrations for the stage, whose address has another port.
- * @returns JSON of a profile, by the device's name
- */
-export function calibrations(): Record<string, string> {
-  return Object.fromEntries(local.keys(PREFIX).map(
-    (key) => [key.slice(PREFIX.length), local.get(key) ?? '']));
-}
 
 /** The check, until it is left. */
 export class DeviceCheck {

@@ -3,7 +3,7 @@
 /** The cockpit's stage inside the participant's page, and the gate before each drive. */
 
 import { element, setAttribute, setText } from '../../cockpit/js/dom.js';
-import { calibrations } from './device_check.js';
+import { keptProfiles } from '../../cockpit/js/driving/gamepad_profile.js';
 import { button } from './page_view.js';
 
 import type { DriveDocument, Progress } from './desk_messages.js';
@@ -105,7 +105,7 @@ export class DriveFrame {
     }
     this.#pressed = true;
     this.#ready();
-    this.#post({ kind: 'calibrations', profiles: calibrations() });
+    this.#post({ kind: 'calibrations', profiles: keptProfiles() });
     this.#post({ kind: 'ready', ready: true });
     this.#focusFrame();
   }
@@ -150,7 +150,7 @@ export class DriveFrame {
     const { data } = event;
     if (data?.crgame === 1 && data.kind === 'stage' && typeof data.state === 'object') {
       if (this.#state.seat === undefined) {
-        this.#post({ kind: 'calibrations', profiles: calibrations() });
+        this.#post({ kind: 'calibrations', profiles: keptProfiles() });
       }
       this.#state = data.state ?? {};
       if (!this.#root.hidden) {

@@ -138,6 +138,15 @@ export function saveProfile(id: string, profile: Profile | null) {
 }
 
 /**
+ * Return this browser's stored mappings for a page whose address has another port.
+ * @returns JSON of each, by the gamepad's id
+ */
+export function keptProfiles(): Record<string, string> {
+  return Object.fromEntries(local.keys(PREFIX).map(
+    (key) => [key.slice(PREFIX.length), local.get(key) ?? '']));
+}
+
+/**
  * Save the mappings of another page of this machine; invalid ones are left out.
  * @param profiles JSON of each, by the gamepad's id
  */
