@@ -6,7 +6,7 @@ import { element, setAttribute, setText } from '../../cockpit/js/dom.js';
 import { keptProfiles } from '../../cockpit/js/driving/gamepad_profile.js';
 import { button } from './page_view.js';
 
-import type { DriveDocument, Progress } from './desk_messages.js';
+import type { DriveDocument } from './desk_messages.js';
 import type { Words } from './words.js';
 import type { StageState } from '../../cockpit/js/stage/stage_messages.js';
 
@@ -20,6 +20,7 @@ export class DriveFrame {
   #ready;
   #frame: HTMLIFrameElement | null = null;
   #link = '';
+  #address: URL | null = null; // of the link, if it has a page
   #phase = '';
   #pressed = false;
   #awaitsOthers = false;
@@ -58,7 +59,7 @@ export class DriveFrame {
     this.#phase = shown.phase;
     this.#pressed &&= shown.phase === 'ready' && !entered;
     this.#awaitsOthers = shown.awaits_others;
-    setText(this.#title, titleOf(shown, shown.progress, this.#words));
+    setText(this.#title, titleOf(shown, this.#words));
     setText(this.#text, this.#words.of(
       shown.phase === 'ended' ? 'ended_text' : shown.awaits_others ? 'others_text'
         : shown.attempt > 1 && !shown.practice ? 'again_text' : 'ready_text'));
@@ -126,24 +127,22 @@ export class DriveFrame {
     this.#state = {};
     this.#frame?.remove();
     this.#frame = null;
-    const src = stageAddress(link, window.location);
-    if (src !== null) {
-      this.#frame = element('iframe', { src: src.href, title: this.#title.textContent || 'drive',
-        allow: 'gamepad; fullscreen; autoplay' });
+    this.#address = stageAddress(link, window.location);
+    if (this.#address !== null) {
+      this.#frame = element('iframe', { src: this.#address.href,
+        title: this.#title.textContent || 'drive', allow: 'gamepad; fullscreen; autoplay' });
       this.#root.prepend(this.#frame);
     }
   }
 
   #post(message: Record<string, unknown>) {
-    const src = stageAddress(this.#link, window.location);
-    if (src !== null) {
-      this.#frame?.contentWindow?.postMessage({ crgame: 1, ...message }, src.origin);
+    if (this.#address !== null) {
+      this.#frame?.contentWindow?.postMessage({ crgame: 1, ...message }, this.#address.origin);
     }
   }
 
   #hear(event: MessageEvent) {
-    const src = stageAddress(this.#link, window.location);
-    if (src === null || event.origin !== src.origin
+    if (this.#address === null || event.origin !== this.#address.origin
         || event.source !== this.#frame?.contentWindow) {
       return;
     }
@@ -179,8 +178,7 @@ export function stageAddress(link: string, location: { hostname: string }): URL 
   return url;
 }
 
-function titleOf({ practice, number }: DriveDocument, progress: Progress | undefined,
-  words: Words) {
+function titleOf({ practice, number, progress }: DriveDocument, words: Words) {
   return practice ? words.of('practice', { number })
     : words.of('drive', { number, of: progress?.drives ?? number });
 }
