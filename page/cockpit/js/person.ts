@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The key of this page, by which the server recognises it after a lost connection. */
 
-import { local, session } from './panels/memory.js';
+import { isKey, local, newKey, session } from './panels/memory.js';
 
 import type { Connection } from './connection.js';
 import type { Store } from './store.js';
@@ -54,11 +54,5 @@ export class Person {
 /** @returns the key in the address, null if there is none */
 function givenKey(): string | null {
   const key = new URLSearchParams(window.location.search).get('key') ?? '';
-  return /^[0-9a-f]{32}$/.test(key) ? key : null;
-}
-
-/** Return 128 random bits; randomUUID exists on secure origins only. */
-function newKey() {
-  return [...crypto.getRandomValues(new Uint8Array(16))]
-    .map((byte) => byte.toString(16).padStart(2, '0')).join('');
+  return isKey(key) ? key : null;
 }

@@ -3,7 +3,7 @@
 /** The participant's page, which shows the server's documents and sends the answers. */
 
 import { element, part, setAttribute, setText } from '../../cockpit/js/dom.js';
-import { session } from '../../cockpit/js/panels/memory.js';
+import { isKey, newKey, session } from '../../cockpit/js/panels/memory.js';
 import { breakView } from './break_view.js';
 import { DeskConnection } from './desk_connection.js';
 import { DeviceCheck } from './device_check.js';
@@ -216,14 +216,10 @@ function keyOf(shown: DeskDocument) {
 
 /** @returns the same as long as this tab lives */
 function pageKey(): string {
-  const kept = session.get(PAGE_KEY);
-  if (kept !== null && /^[0-9a-f]{32}$/.test(kept)) {
-    return kept;
-  }
-  const made = [...crypto.getRandomValues(new Uint8Array(16))]
-    .map((byte) => byte.toString(16).padStart(2, '0')).join('');
-  session.set(PAGE_KEY, made);
-  return made;
+  const kept = session.get(PAGE_KEY) ?? '';
+  const key = isKey(kept) ? kept : newKey();
+  session.set(PAGE_KEY, key);
+  return key;
 }
 
 new ParticipantPage();

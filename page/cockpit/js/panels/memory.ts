@@ -55,6 +55,17 @@ export const local = new Memory('localStorage');
 /** Kept as long as the tab lives. */
 export const session = new Memory('sessionStorage');
 
+/** Make a key: 128 random bits; randomUUID exists on secure origins only. */
+export function newKey(): string {
+  return [...crypto.getRandomValues(new Uint8Array(16))]
+    .map((byte) => byte.toString(16).padStart(2, '0')).join('');
+}
+
+/** Return whether a text is a key. */
+export function isKey(text: string): boolean {
+  return /^[0-9a-f]{32}$/.test(text);
+}
+
 /** Return the value of a preference, empty if none was kept. */
 export function recall(name: string): string {
   return local.get(PREFIX + name) ?? '';
