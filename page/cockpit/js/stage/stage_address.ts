@@ -3,7 +3,7 @@
 /** The settings in the address of a stage, the page for a driver. */
 
 import { VIEWPOINTS } from '../view3d/cameras.js';
-import { FIELD_OF_VIEW } from '../view3d/field_of_view.js';
+import { readAngle } from '../view3d/field_of_view.js';
 
 import type { StageView } from './stage_messages.js';
 
@@ -36,13 +36,12 @@ export function readStage(query: string): StageAddress | null {
   }
   const flag = (name: string,
     usual: boolean): boolean => (usual ? values.get(name) !== '0' : values.get(name) === '1');
-  const angle = Number(values.get('fov') ?? NaN);
   return {
     seat, view: [...VIEWPOINTS, 'map' as const].find(
       (name) => name === values.get('view')) ?? 'driver',
     map: flag('map', true), names: flag('names', false), plans: flag('plans', false),
     sound: flag('sound', true), mirrors: flag('mirrors', true), change: flag('change', false),
-    fieldOfView_deg: angle >= FIELD_OF_VIEW.least && angle <= FIELD_OF_VIEW.most ? angle : null,
+    fieldOfView_deg: readAngle(values),
     corner: CORNERS.find((name) => name === values.get('corner')) ?? null,
   };
 }

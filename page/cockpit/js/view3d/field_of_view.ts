@@ -53,6 +53,15 @@ export function acrossAngle(seat: Seat | null, chosen_deg: number, width: number
 }
 
 /**
+ * Read the angle across the picture in a page's address.
+ * @returns [deg]; null if there is none, or it is out of range
+ */
+export function readAngle(values: URLSearchParams): number | null {
+  const angle = Number(values.get('fov') ?? NaN);
+  return angle >= FIELD_OF_VIEW.least && angle <= FIELD_OF_VIEW.most ? angle : null;
+}
+
+/**
  * Read the entries about screen and seat.
  * @param width of the screen [cm]
  * @param distance of the eyes from it [cm]

@@ -4,7 +4,7 @@
 
 import { DEGREE } from '../units.js';
 import { VIEWPOINTS } from './cameras.js';
-import { FIELD_OF_VIEW } from './field_of_view.js';
+import { readAngle } from './field_of_view.js';
 
 import type { Viewpoint } from './cameras.js';
 
@@ -29,9 +29,8 @@ export function readViewWindow(query: string): ViewWindow | null {
     return null;
   }
   const yaw = Number(values.get('yaw') ?? 0);
-  const angle = Number(values.get('fov') ?? NaN);
   return {
     viewpoint, aside: Number.isFinite(yaw) ? yaw * DEGREE : 0, vehicle: values.get('vehicle'),
-    fieldOfView_deg: angle >= FIELD_OF_VIEW.least && angle <= FIELD_OF_VIEW.most ? angle : null,
+    fieldOfView_deg: readAngle(values),
   };
 }
