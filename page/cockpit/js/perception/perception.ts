@@ -17,15 +17,26 @@ import type { World } from '../world/world.js';
 
 export type LayerName = 'unseen' | 'rays' | 'estimate' | 'occupancy';
 
-// name: [strokes of its button, title, whether it is on at first, needs a perceiving AV]
-const LAYERS: Record<LayerName,
-  [strokes: string, title: string, first: boolean, needsAv: boolean]> = {
-  unseen: ['M3 3l18 18M10 6a9 9 0 0 1 11 6a12 12 0 0 1-3 4M6 8a12 12 0 0 0-3 4'
-    + 'a9 9 0 0 0 12 5', 'Outlines of objects that the followed AV does not see', true, true],
-  rays: ['M4 12L20 4M4 12h16M4 12l16 8M3 12h.01', 'Rays of its sensors', false, true],
-  estimate: ['M3 8h3M10 8h4M18 8h3v3M21 14v2h-3M14 16h-4M6 16H3v-2M3 11V8',
-    'Its estimated pose', false, true],
-  occupancy: ['M3 3h8v8H3zM13 13h8v8h-8zM13 3h8v8h-8z', 'Permanent obstacles', true, false],
+interface Layer {
+  strokes: string; // of its button
+  title: string;
+  first: boolean; // whether it is on at first
+  needsAv: boolean; // that perceives
+  entry: [strokes: string, words: string]; // of the legend, in a box of 28 x 16; $ is the AV
+}
+
+const LAYERS: Record<LayerName, Layer> = {
+  unseen: { strokes: 'M3 3l18 18M10 6a9 9 0 0 1 11 6a12 12 0 0 1-3 4M6 8a12 12 0 0 0-3 4'
+    + 'a9 9 0 0 0 12 5', title: 'Outlines of objects that the followed AV does not see',
+  first: true, needsAv: true, entry: ['M14 2a6 6 0 1 0 .01 0z', 'not seen by $'] },
+  rays: { strokes: 'M4 12L20 4M4 12h16M4 12l16 8M3 12h.01', title: 'Rays of its sensors',
+    first: false, needsAv: true, entry: ['M2 14L26 2V14z', 'what the sensors of $ reach'] },
+  estimate: { strokes: 'M3 8h3M10 8h4M18 8h3v3M21 14v2h-3M14 16h-4M6 16H3v-2M3 11V8',
+    title: 'Its estimated pose', first: false, needsAv: true,
+    entry: ['M3 4h22v8H3z', 'estimated pose of $, 2σ'] },
+  occupancy: { strokes: 'M3 3h8v8H3zM13 13h8v8h-8zM13 3h8v8h-8z', title: 'Permanent obstacles',
+    first: true, needsAv: false,
+    entry: ['M3 3h10v10H3zM15 3h10v10H15z', 'permanent obstacles'] },
 };
 
 // Prefix of layer names: another part may have a layer called rays.
@@ -145,7 +156,7 @@ class Perception {
 
   #addButtons() {
     for (const name of NAMES) {
-      const [strokes, title, first] = LAYERS[name];
+      const { strokes, title, first } = LAYERS[name];
       const button = toolButton(this.#group, strokes, title,
         () => this.set(name, !this.#on[name]));
       button.dataset.layer = name;
@@ -160,7 +171,7 @@ class Perception {
     this.#unseen = scene === null ? null : new Unseen(scene);
     const perceiving = scene?.vehicles.some(({ perception }) => perception) ?? false;
     for (const [name, button] of this.#buttons) {
-      button.hidden = LAYERS[name][3] ? !perceiving : !scene?.occupancy;
+      button.hidden = LAYERS[name].needsAv ? !perceiving : !scene?.occupancy;
     }
     this.#group.hidden = !perceiving && !scene?.occupancy;
     this.#sendLayers();
@@ -223,21 +234,14 @@ export function createPerception(stage: HTMLElement, store: Store,
   return new Perception(stage, store, connection, window.crgame.world);
 }
 
-// name: [strokes in a box of 28 x 16, words]; $ is the AV. The styles are in world.css.
-const ENTRIES: Record<string, [strokes: string, words: string]> = {
-  unseen: ['M14 2a6 6 0 1 0 .01 0z', 'not seen by $'],
-  rays: ['M2 14L26 2V14z', 'what the sensors of $ reach'],
-  estimate: ['M3 4h22v8H3z', 'estimated pose of $, 2σ'],
-  occupancy: ['M3 3h10v10H3zM15 3h10v10H15z', 'permanent obstacles'],
-};
-
-// Replaces the first entry while the planner's knowledge is unknown.
+// Replaces the first entry of the legend while the planner's knowledge is unknown.
 const UNKNOWN = 'what $ sees is not known now';
 
-/** Put the legend on the stage. */
+/** Put the legend on the stage; its styles are in world.css. */
 function createLegend(stage: HTMLElement) {
   const root = element('ul', { class: 'world-legend', 'aria-label': 'Legend', hidden: true });
-  const rows = Object.entries(ENTRIES).map(([name, [strokes, words]]) => {
+  const rows = NAMES.map((name) => {
+    const [strokes, words] = LAYERS[name].entry;
     const text = element('span', {});
     const row = element('li', { 'data-layer': name, hidden: true },
       svg('svg', { viewBox: '0 0 28 16', 'aria-hidden': 'true' }, svg('path', { d: strokes })),
@@ -252,7 +256,7 @@ function createLegend(stage: HTMLElement) {
      * @param av id of the AV that is followed
      * @param known whether it is known what it sees
      */
-    show(names: string[], av: string, known: boolean) {
+    show(names: LayerName[], av: string, known: boolean) {
       for (const { name, words, row, text } of rows) {
         setText(text, (name === 'unseen' && !known ? UNKNOWN : words).replace('$', av));
         setAttribute(row, 'hidden', !names.includes(name));
