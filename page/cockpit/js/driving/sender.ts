@@ -19,7 +19,8 @@ export class InputSender {
   constructor(connection: Connection, hands: () => Hands) {
     this.#connection = connection;
     this.#hands = hands;
-    setInterval(() => this.#repeat(), REPEAT_MS);
+    // A release is sent once: silence then means the same.
+    setInterval(() => this.#send((input) => !('away' in input)), REPEAT_MS);
   }
 
   /** @returns the seat that receives the inputs */
@@ -38,30 +39,19 @@ export class InputSender {
 
   /** Send at once if the inputs have changed. */
   update() {
+    this.#send((_, text) => text !== this.#last);
+  }
+
+  /** @param wanted whether inputs, also as text, are sent */
+  #send(wanted: (input: Hands, text: string) => boolean) {
     if (this.#seat === null) {
       return;
     }
     const input = this.#hands();
     const text = JSON.stringify(input);
-    if (text !== this.#last) {
+    if (wanted(input, text)) {
       this.#last = text;
-      this.#send(this.#seat, input);
+      this.#connection.send({ type: 'input', seat: this.#seat, ...input });
     }
-  }
-
-  #repeat() {
-    if (this.#seat === null) {
-      return;
-    }
-    const input = this.#hands();
-    // A release is sent once: silence then means the same.
-    if (!('away' in input)) {
-      this.#last = JSON.stringify(input);
-      this.#send(this.#seat, input);
-    }
-  }
-
-  #send(seat: string, input: Hands) {
-    this.#connection.send({ type: 'input', seat, ...input });
   }
 }
