@@ -76,7 +76,7 @@ export class Listener {
     }
     const own = index >= 0 ? this.#driven(scene.vehicles[index], vehicles, index)
       : this.#passenger(scene.objects[column], objects, column);
-    const ear = index >= 0 ? headOf(scene.vehicles[index], vehicles, index)
+    const ear = index >= 0 ? pointOf(vehicles, index, scene.vehicles[index].driver_place.eye)
       : objectAt(objects, column);
     if (own === null || !Number.isFinite(ear.x)) {
       return null;
@@ -127,7 +127,7 @@ export class Listener {
     const all: { id: string; train: DriveTrain; source: Moving; lights: number }[] = [];
     scene.vehicles.forEach((vehicle, index) => {
       all.push({ id: vehicle.id, train: trainOf(vehicle),
-        source: centreOf(vehicle, vehicles, index),
+        source: pointOf(vehicles, index, [vehicle.rear_to_center, 0]),
         lights: vehicles[index * VEHICLE_WIDTH + VEHICLE.lights] || 0 });
     });
     scene.objects.forEach((object, column) => {
@@ -167,19 +167,8 @@ function guessThrottle(speed: number, acceleration: number) {
   return Math.min(Math.max(holding + THROTTLE_PER_ACCELERATION * acceleration, 0), 1);
 }
 
-/** @returns the middle of its outline */
-function centreOf(vehicle: SceneVehicle, rows: Float64Array, index: number): Moving {
-  return aheadOf(rows, index, vehicle.rear_to_center, 0);
-}
-
-/** @returns its driver's head */
-function headOf(vehicle: SceneVehicle, rows: Float64Array, index: number): Moving {
-  const [ahead, left] = vehicle.driver_place.eye;
-  return aheadOf(rows, index, ahead, left);
-}
-
-/** `ahead` of the rear axle [m]; `left` of it [m]. */
-function aheadOf(rows: Float64Array, index: number, ahead: number, left: number): Moving {
+/** Return a point of a vehicle: its middle, its driver's eye; from its rear axle [m]. */
+function pointOf(rows: Float64Array, index: number, [ahead, left]: number[]): Moving {
   const at = index * VEHICLE_WIDTH;
   const [yaw, speed] = [rows[at + VEHICLE.yaw], rows[at + VEHICLE.speed]];
   const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];

@@ -55,11 +55,9 @@ function stateOf({ allowed, wanted, on }: Sound) {
     return { icon: 'sound', title: 'Sound: on (M turns it off)',
       note: 'What the driver of your vehicle hears, or of the one you follow.' };
   }
-  return wanted
-    ? { icon: 'sound_off', title: 'Sound: begins with your next click or key',
-      note: 'Browsers let a page sound only after a click or a key.' }
-    : { icon: 'sound_off', title: 'Sound: off (M turns it on)',
-      note: 'Browsers let a page sound only after a click or a key.' };
+  return { icon: 'sound_off',
+    title: wanted ? 'Sound: begins with your next click or key' : 'Sound: off (M turns it on)',
+    note: 'Browsers let a page sound only after a click or a key.' };
 }
 
 /** @param name readable name */

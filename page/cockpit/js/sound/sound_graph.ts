@@ -62,9 +62,15 @@ export class SoundGraph {
       (_, number) => new OtherVoice(context, noise, this.#mix, number));
   }
 
-  /** Fade in; `gain`: 0 to 1; `when`: time of the context [s]. */
+  /** Fade to a gain, 0 to 1; `when`: time of the context [s]. */
   open(gain: number, when: number) {
-    this.#fade(gain, when);
+    const { gain: param } = this.#gate;
+    const { from, to, at } = this.#fading;
+    const now = from + (to - from) * Math.min(Math.max((when - at) / FADE_S, 0), 1);
+    this.#fading = { from: now, to: gain, at: when };
+    param.cancelScheduledValues(when);
+    param.setValueAtTime(now, when);
+    param.linearRampToValueAtTime(gain, when + FADE_S);
   }
 
   /**
@@ -73,7 +79,7 @@ export class SoundGraph {
    * @returns time from which it is silent [s]
    */
   hush(when: number): number {
-    this.#fade(0, when);
+    this.open(0, when);
     // Events during the silence are dropped.
     this.#trouble = null;
     this.#horn.update(false, 1, when);
@@ -124,16 +130,6 @@ export class SoundGraph {
         ?? this.#others.find((free) => free.isFree(when));
       voice?.update(other, when);
     }
-  }
-
-  #fade(gain: number, when: number) {
-    const { gain: param } = this.#gate;
-    const { from, to, at } = this.#fading;
-    const now = from + (to - from) * Math.min(Math.max((when - at) / FADE_S, 0), 1);
-    this.#fading = { from: now, to: gain, at: when };
-    param.cancelScheduledValues(when);
-    param.setValueAtTime(now, when);
-    param.linearRampToValueAtTime(gain, when + FADE_S);
   }
 
   /** @returns nodes that limit the mix to a safe level */
