@@ -81,14 +81,10 @@ export class People {
 
   #row({ client, name, role, seat, round_trip_ms, input_delay_ms }: Present) {
     const me = client === this.#store.me.id ? ' (you)' : '';
-    const delays = [
-      round_trip_ms === null ? '' : `round trip ${round_trip_ms.toFixed(0)} ms`,
-      input_delay_ms === null ? '' : `input latency ${input_delay_ms.toFixed(0)} ms`,
-    ].filter(Boolean).join(', ');
     return element('li', { 'data-client': client },
       element('strong', { text: `${oneLine(name)}${me}` }),
       element('span', { text: seat === null ? role : `${role} in ${seat}` }),
-      element('span', { class: 'drive-note', text: delays }));
+      delays(['round trip', round_trip_ms, 0], ['input latency', input_delay_ms, 0]));
   }
 
   #choose() {
@@ -131,11 +127,13 @@ export class People {
 }
 
 function deviceRow({ seat, device, command_ms, input_delay_ms }: DeviceDelay) {
-  const delays = [
-    command_ms === null ? '' : `command latency ${command_ms.toFixed(1)} ms`,
-    input_delay_ms === null ? '' : `input latency ${input_delay_ms.toFixed(0)} ms`,
-  ].filter(Boolean).join(', ');
   return element('li', { 'data-device': seat }, element('strong', { text: oneLine(device) }),
     element('span', { text: `drives ${seat} at the machine of the game` }),
-    element('span', { class: 'drive-note', text: delays }));
+    delays(['command latency', command_ms, 1], ['input latency', input_delay_ms, 0]));
+}
+
+/** Make the note with the delays that are known. */
+function delays(...all: [name: string, delay_ms: number | null, digits: number][]) {
+  return element('span', { class: 'drive-note', text: all.flatMap(([name, delay_ms, digits]) => (
+    delay_ms === null ? [] : [`${name} ${delay_ms.toFixed(digits)} ms`])).join(', ') });
 }
