@@ -24,7 +24,7 @@ beforeEach(() => {
   store = liveStore(VEHICLES, SCENE);
   store.receive({ type: 'status', run: 'paused', n: 0, epoch: 0 });
   keyboard = new Keyboard(() => true, { changed() {}, reversed() {} });
-  subject = { id: 'hv0', driven: true, away: null, lost: '', reverse: false, keyboard,
+  subject = { id: 'hv0', driven: true, away: null, lost: '', reverse: false,
     driver: 'Keyboard' };
   n = 0;
   new Hud(root, store, () => subject, keyboard);

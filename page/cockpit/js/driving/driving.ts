@@ -222,7 +222,7 @@ export class Driving {
     const id = this.seat ?? window.crgame?.world?.followed ?? null;
     return {
       id, driven: this.seat !== null, away: this.away, lost: this.#lost, reverse: this.#reverse,
-      keyboard: this.keyboard, driver: this.#driverOf(id),
+      driver: this.#driverOf(id),
     };
   }
 

@@ -34,7 +34,6 @@ export interface Subject {
   away: string | null;
   lost: string;
   reverse: boolean;
-  keyboard: Keyboard;
   driver: string;
 }
 
@@ -43,6 +42,7 @@ export class Hud {
   #root;
   #store;
   #subject;
+  #keyboard;
   #parts;
   #limits = new SpeedLimits(null);
   #numbersAt_ms = -Infinity;
@@ -58,6 +58,7 @@ export class Hud {
     this.#root = root;
     this.#store = store;
     this.#subject = subject;
+    this.#keyboard = keyboard;
     this.#parts = buildParts(keyboard);
     root.replaceChildren(this.#parts.banner, this.#parts.board);
     root.classList.add('hud');
@@ -110,9 +111,9 @@ export class Hud {
   }
 
   /** Update the moving parts, in every animation frame. */
-  #show(row: Float64Array, { driven, keyboard, reverse }: Subject) {
+  #show(row: Float64Array, { driven, reverse }: Subject) {
     const p = this.#parts;
-    const [throttleKey, brakeKey, left, right] = driven ? keyboard.keys : [0, 0, 0, 0];
+    const [throttleKey, brakeKey, left, right] = driven ? this.#keyboard.keys : [0, 0, 0, 0];
     const command = row[VEHICLE.steering];
     p.throttle.show(row[VEHICLE.throttle], throttleKey === 1);
     p.brake.show(row[VEHICLE.brake], brakeKey === 1);
@@ -123,7 +124,7 @@ export class Hud {
     setAttribute(p.keycaps.node, 'hidden', !driven);
     setAttribute(this.#root, 'data-driven', driven);
     if (driven) {
-      p.keycaps.show(keyboard, reverse);
+      p.keycaps.show(reverse);
     }
   }
 
@@ -262,10 +263,12 @@ const CAPS: [code: string, text: string, twin: string | null, title: string, sig
 /** The drawn keys; `node` goes into the page. */
 class Keycaps {
   #caps = new Map<string, HTMLElement>();
+  #keyboard;
   node;
 
-  /** @param keyboard receives touch presses */
-  constructor(keyboard: Pick<Keyboard, 'press' | 'lift'>) {
+  /** @param keyboard has the held keys, and receives touch presses */
+  constructor(keyboard: Keyboard) {
+    this.#keyboard = keyboard;
     for (const [code, text, , title, sign] of CAPS) {
       const lift = () => keyboard.lift(code);
       this.#caps.set(code, element('kbd', { class: `cap cap-${code}`, title,
@@ -289,10 +292,10 @@ class Keycaps {
   }
 
   /** Light the held keys; `reverse`: whether the reverse gear is requested. */
-  show(keyboard: Keyboard, reverse: boolean) {
+  show(reverse: boolean) {
     for (const [code, , twin] of CAPS) {
       const on = code === 'KeyR' ? reverse
-        : keyboard.isHeld(code) || (twin !== null && keyboard.isHeld(twin));
+        : this.#keyboard.isHeld(code) || (twin !== null && this.#keyboard.isHeld(twin));
       setAttribute(this.#cap(code), 'data-on', on);
     }
   }
