@@ -57,6 +57,14 @@ export function part(root: HTMLElement, id: string): HTMLElement {
   return found;
 }
 
+/** Call a function in every animation frame from the next on, with the frame's time [ms]. */
+export function inEveryFrame(draw: (now_ms: number) => void) {
+  requestAnimationFrame((now_ms) => {
+    inEveryFrame(draw);
+    draw(now_ms);
+  });
+}
+
 /** Write text only when it changed, because every write costs a layout. */
 export function setText(node: Element, text: string) {
   if (node.textContent !== text) {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The instruments and keys over the world, of the driven or the watched vehicle. */
 
-import { element, setAttribute, setText } from '../dom.js';
+import { element, inEveryFrame, setAttribute, setText } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { LIGHT, shining } from '../lights.js';
 import { DEGREES, KMH } from '../units.js';
@@ -65,11 +65,7 @@ export class Hud {
     store.on('scene', (scene) => this.#setScene(scene));
     store.on('events', ({ fired }) => this.#limits.applyEvents(fired));
     this.#setScene(store.scene);
-    const frame = (now_ms: number) => {
-      this.#draw(now_ms);
-      requestAnimationFrame(frame);
-    };
-    requestAnimationFrame(frame);
+    inEveryFrame((now_ms) => this.#draw(now_ms));
   }
 
   #setScene(scene: Scene | null) {

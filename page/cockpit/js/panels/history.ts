@@ -3,7 +3,7 @@
 /** A panel of scrolling plots (FastSim's history of the host vehicle). */
 
 import { limitsOf } from '../criticality.js';
-import { element, setAttribute, setText } from '../dom.js';
+import { element, inEveryFrame, setAttribute, setText } from '../dom.js';
 import { onThemeChange, themeColor } from '../world/palette.js';
 import { Chart } from './chart.js';
 import { errorText } from './format.js';
@@ -83,11 +83,7 @@ export class HistoryPanel {
     if (store.scene !== null) {
       this.#newScene();
     }
-    const frame = (now_ms: number) => {
-      this.#frame(now_ms);
-      requestAnimationFrame(frame);
-    };
-    requestAnimationFrame(frame);
+    inEveryFrame((now_ms) => this.#frame(now_ms));
   }
 
   /** The vehicles that are plotted, in the scene's order. */

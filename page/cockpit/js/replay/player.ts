@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The player of a recording: the shown time, its motion, and the run that it belongs to. */
 
+import { inEveryFrame } from '../dom.js';
 import { ask } from './chunks.js';
 import { ReplayDocuments } from './documents.js';
 import { ReplayFeed } from './replay_feed.js';
@@ -52,11 +53,7 @@ export class Player {
         store.receive({ type: 'scene', ...this.info.scene });
       }
     });
-    const frame = (now_ms: number) => {
-      this.#advance(now_ms);
-      requestAnimationFrame(frame);
-    };
-    requestAnimationFrame(frame);
+    inEveryFrame((now_ms) => this.#advance(now_ms));
     open();
   }
 

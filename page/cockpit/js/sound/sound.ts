@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Sound and rumble of the vehicle whose seat this page holds, else of the followed one. */
 
+import { inEveryFrame } from '../dom.js';
 import { connectedPads } from '../driving/gamepad.js';
 import { isCommand } from '../driving/focus.js';
 import { recall, remember } from '../panels/memory.js';
@@ -69,14 +70,12 @@ export class Sound {
       this.#sentSettings = '';
       this.#sendSettings();
     });
-    const frame = (now_ms: number) => {
-      requestAnimationFrame(frame);
+    inEveryFrame((now_ms) => {
       if (now_ms >= this.#next_ms) {
         this.#next_ms = now_ms + EVERY_MS;
         this.#update(now_ms);
       }
-    };
-    requestAnimationFrame(frame);
+    });
     this.#sendSettings();
   }
 

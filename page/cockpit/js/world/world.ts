@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The world: map, vehicles and plans, drawn on a canvas in each animation frame. */
 
+import { inEveryFrame } from '../dom.js';
 import { Camera } from './camera.js';
 import { hideBeyond } from './driver_sight.js';
 import { attachGestures } from './gestures.js';
@@ -71,7 +72,7 @@ export class World {
     this.#attachHands(options);
     this.#attachSizes(options.covered ?? null);
     this.#attachStore();
-    requestAnimationFrame((now_ms) => this.#animate(now_ms));
+    inEveryFrame((now_ms) => this.#draw(now_ms));
   }
 
   /** Return the id of the followed vehicle or object, null while the camera is free. */
@@ -261,11 +262,6 @@ export class World {
   #poseOf(id: string | null): Pose | null {
     return id === null || this.shown === null ? null
       : this.#painter.vehicles.poseOf(id, this.shown);
-  }
-
-  #animate(now_ms: number) {
-    requestAnimationFrame((next_ms) => this.#animate(next_ms));
-    this.#draw(now_ms);
   }
 
   #hideUnseen() {
