@@ -14,33 +14,32 @@ const THINGS: Record<string, string> = {
   roadBoundary: 'a barrier', unknown: 'an obstacle',
 };
 
+// The kind in words, and what it does.
 const ACTIONS: {
-  [Kind in EventAction['kind']]: (event: Extract<EventAction, { kind: Kind }>) => string
+  [Kind in EventAction['kind']]: [title: string,
+    words: (event: Extract<EventAction, { kind: Kind }>) => string]
 } = {
-  release: (event) => `Releases obstacle ${event.object}, which waits until then`,
-  brake: (event) => `Obstacle ${event.object} brakes at ${fixed(event.deceleration, 1)} m/s² to `
-    + (event.speed > 0 ? speed(event.speed) : 'a stop'),
-  obstacle: (event) => `Puts ${THINGS[event.type] ?? THINGS.unknown} of `
-    + `${fixed(event.length, 1)} × ${fixed(event.width, 1)} m ${place(event)}`,
-  speed_limit: (event) => `Sets the speed limit of ${lanelets(event.lanelets)} to `
-    + speed(event.speed),
-  traffic: (event) => `${event.agent === 'all' ? 'All agents of traffic'
-    : `Agent ${event.agent}`} from then on: ${driving(event)}`,
-  plan_display: (event) => `${event.show ? 'Shows' : 'Hides'} the plan of ${event.av}`,
-  planner: (event) => `Replaces the planner of ${event.av} by ${baseName(event.planner)}`,
-  planner_run: (event) => (event.run ? `Lets the planner of ${event.av} go on`
-    : `Stops the planner of ${event.av}: it is asked for no plan`),
-};
-
-const TITLES: Record<EventAction['kind'], string> = {
-  release: 'Release', brake: 'Brake', obstacle: 'Obstacle', speed_limit: 'Speed limit',
-  traffic: 'Traffic', plan_display: 'Plan display', planner: 'Planner',
-  planner_run: 'Planner stop or go',
+  release: ['Release', (event) => `Releases obstacle ${event.object}, which waits until then`],
+  brake: ['Brake', (event) => `Obstacle ${event.object} brakes at ${fixed(event.deceleration, 1)} `
+    + `m/s² to ${event.speed > 0 ? speed(event.speed) : 'a stop'}`],
+  obstacle: ['Obstacle', (event) => `Puts ${THINGS[event.type] ?? THINGS.unknown} of `
+    + `${fixed(event.length, 1)} × ${fixed(event.width, 1)} m ${place(event)}`],
+  speed_limit: ['Speed limit', (event) => 'Sets the speed limit of '
+    + `${lanelets(event.lanelets)} to ${speed(event.speed)}`],
+  traffic: ['Traffic', (event) => `${event.agent === 'all' ? 'All agents of traffic'
+    : `Agent ${event.agent}`} from then on: ${driving(event)}`],
+  plan_display: ['Plan display', (event) => `${event.show ? 'Shows' : 'Hides'} the plan of `
+    + event.av],
+  planner: ['Planner', (event) => `Replaces the planner of ${event.av} by `
+    + baseName(event.planner)],
+  planner_run: ['Planner stop or go', (event) => (event.run
+    ? `Lets the planner of ${event.av} go on`
+    : `Stops the planner of ${event.av}: it is asked for no plan`)],
 };
 
 /** Return the kind of an entry of scene.events in words. */
 export function eventKind(event: GameEvent): string {
-  return Object.hasOwn(TITLES, event.kind) ? TITLES[event.kind]
+  return Object.hasOwn(ACTIONS, event.kind) ? ACTIONS[event.kind][0]
     : String(event.kind ?? '').replaceAll('_', ' ');
 }
 
@@ -50,7 +49,7 @@ export function eventKind(event: GameEvent): string {
  */
 export function eventWords(event: GameEvent): string {
   if (Object.hasOwn(ACTIONS, event.kind)) {
-    const words = ACTIONS[event.kind] as (event: GameEvent) => string;
+    const words = ACTIONS[event.kind][1] as (event: GameEvent) => string;
     return `${words(event)}.`;
   }
   return Object.entries(event)
