@@ -20,8 +20,8 @@ const PILLAR_M = 0.05;
  */
 export function createCabin(three: Three, vehicle: SceneVehicle, paint: number) {
   const mesh = new MeshBuilder();
-  const { red, green, blue } = rgbOf(three, paint);
-  addBonnet(mesh, vehicle, [red, green, blue]);
+  const { r, g, b } = new three.Color(paint);
+  addBonnet(mesh, vehicle, [r, g, b]);
   addFrame(mesh, vehicle);
   const cabin = new three.Mesh(geometryOf(three, mesh.arrays(false)),
     new three.MeshLambertMaterial({ vertexColors: true, side: three.DoubleSide }));
@@ -29,11 +29,6 @@ export function createCabin(three: Three, vehicle: SceneVehicle, paint: number) 
   // Drawn first, so that hidden parts are not computed.
   cabin.renderOrder = -1;
   return cabin;
-}
-
-function rgbOf(three: Three, paint: number) {
-  const { r: red, g: green, b: blue } = new three.Color(paint);
-  return { red, green, blue };
 }
 
 /** A crowned sheet from the windscreen to the bumper, which sinks towards its front. */
@@ -82,9 +77,5 @@ function bar(mesh: MeshBuilder, from: Point, to: Point, width: number) {
   const w = width / 2;
   const section = ([x, y, z]: Point): Point[] => [[x + w, y - w, z - w], [x + w, y + w, z - w],
     [x - w, y + w, z + w], [x - w, y - w, z + w]];
-  const [low, high] = [section(from), section(to)];
-  low.forEach((corner, i) => {
-    const next = (i + 1) % 4;
-    mesh.polygon([corner, low[next], high[next], high[i]], INSIDE);
-  });
+  mesh.sides(section(from), section(to), INSIDE);
 }

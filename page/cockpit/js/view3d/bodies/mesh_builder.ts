@@ -55,10 +55,15 @@ export class MeshBuilder {
     const high: Point[] = [[x0 + x, y0 + y, z1], [x1 - x, y0 + y, z1], [x1 - x, y1 - y, z1],
       [x0 + x, y1 - y, z1]];
     this.polygon([...low].reverse(), tint).polygon(high, tint);
-    for (let i = 0; i < 4; i += 1) {
-      const next = (i + 1) % 4;
-      this.polygon([low[i], low[next], high[next], high[i]], tint);
-    }
+    return this.sides(low, high, tint);
+  }
+
+  /** Add the sides between two rings, which are counter-clockwise as seen from beyond `high`. */
+  sides(low: Point[], high: Point[], tint: Tint): this {
+    low.forEach((corner, i) => {
+      const next = (i + 1) % low.length;
+      this.polygon([corner, low[next], high[next], high[i]], tint);
+    });
     return this;
   }
 

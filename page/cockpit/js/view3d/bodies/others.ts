@@ -73,19 +73,11 @@ export function prism(vertices: number[], height: number): Body {
     low.reverse();
   }
   const high: Point[] = low.map(([x, y]) => [x, y, height]);
-  const mesh = new MeshBuilder().polygon(high, PAINT);
-  low.forEach((corner, i) => {
-    const next = (i + 1) % low.length;
-    mesh.polygon([corner, low[next], high[next], high[i]], PAINT);
-  });
+  const mesh = new MeshBuilder().polygon(high, PAINT).sides(low, high, PAINT);
   // Stripes all around, as on a road barrier.
   const middle = 0.62 * height;
-  low.forEach(([x, y], i) => {
-    const [x1, y1] = low[(i + 1) % low.length];
-    mesh.polygon([[1.004 * x, 1.004 * y, middle], [1.004 * x1, 1.004 * y1, middle],
-      [1.004 * x1, 1.004 * y1, middle + 0.18 * height], [1.004 * x, 1.004 * y,
-        middle + 0.18 * height]], [0.95, 0.95, 0.95]);
-  });
+  const ring = (z: number) => low.map(([x, y]): Point => [1.004 * x, 1.004 * y, z]);
+  mesh.sides(ring(middle), ring(middle + 0.18 * height), [0.95, 0.95, 0.95]);
   const xs = vertices.filter((_, i) => i % 2 === 0);
   const ys = vertices.filter((_, i) => i % 2 === 1);
   return { mesh, length: Math.max(...xs) - Math.min(...xs),
@@ -99,11 +91,7 @@ function rider(mesh: MeshBuilder, x: number, z: number, lean: number) {
     [at - 0.1, -half, height]];
   const hip = section(x, 0.16, z);
   const chest = section(x + lean, 0.21, z + 0.52);
-  hip.forEach((corner, i) => {
-    const next = (i + 1) % 4;
-    mesh.polygon([corner, hip[next], chest[next], chest[i]], PAINT);
-  });
-  mesh.polygon(chest, PAINT);
+  mesh.sides(hip, chest, PAINT).polygon(chest, PAINT);
   for (const side of [-1, 1]) {
     mesh.box([x - 0.05, side * 0.13 - 0.06, 0.35], [x + 0.35, side * 0.13 + 0.06, z + 0.06], CLOTH,
       { x: 0.1, y: 0 })
