@@ -71,28 +71,23 @@ export class FittedParts {
 
   /** Remove all instances, before they are added anew. */
   clear() {
-    for (const parts of [this.#wheels, this.#lamps, this.#shadows]) {
-      parts?.clear();
-    }
+    this.#all.forEach((parts) => parts?.clear());
   }
 
   /** @param sight of the camera that draws next */
   see(sight: Sight) {
-    for (const parts of [this.#wheels, this.#lamps, this.#shadows]) {
-      parts?.see(sight);
-    }
+    this.#all.forEach((parts) => parts?.see(sight));
   }
 
   /** Free the memory of the graphics card. */
   dispose() {
-    for (const parts of [this.#wheels, this.#lamps, this.#shadows]) {
-      parts?.dispose();
-    }
-    this.#materials.forEach((material) => {
-      material.map?.dispose();
-      material.dispose();
-    });
+    this.#all.forEach((parts) => parts?.dispose());
+    disposeOf(this.#materials);
     this.#materials = [];
+  }
+
+  get #all() {
+    return [this.#wheels, this.#lamps, this.#shadows];
   }
 
   /** Return what pitches a level body, the same object each time; `slope` upwards [rad]. */
@@ -165,6 +160,14 @@ export class FittedParts {
       .scale(this.#vector.set(0.03, width, height));
     this.#lamps?.add(this.#matrix, this.#color.setHex(color), own);
   }
+}
+
+/** Free the memory of materials and their pictures. */
+export function disposeOf(materials: MeshBasicMaterial[]) {
+  materials.forEach((material) => {
+    material.map?.dispose();
+    material.dispose();
+  });
 }
 
 /** @returns lamps that shine, independent of the light */

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Headlights and tail lamps at dusk and in fog: lamps, their glow, and the light on the road. */
 
-import { lampPart } from './fitted_parts.js';
+import { disposeOf, lampPart } from './fitted_parts.js';
 import { contrastLeft } from './road/fog.js';
 import { mergeable, SeenInstances } from './seen_instances.js';
 
@@ -99,10 +99,7 @@ export class Headlights {
   /** Free the memory of the graphics card. */
   dispose() {
     this.#parts.forEach((part) => part.dispose());
-    this.#materials.forEach((material) => {
-      material.map?.dispose();
-      material.dispose();
-    });
+    disposeOf(this.#materials);
     this.#parts = [];
     this.#materials = [];
   }
