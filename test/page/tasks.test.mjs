@@ -6,8 +6,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { answeredBy, isTaken, keyName } from '../../page/cockpit/js/tasks/answers.js';
-import { Prompt } from '../../page/cockpit/js/tasks/prompt.js';
-import { RunningTime } from '../../page/cockpit/js/tasks/running_time.js';
+import { Prompt, RunningTime } from '../../page/cockpit/js/tasks/prompt.js';
 import { labelsOf, languageOf, WORDS } from '../../page/cockpit/js/driver_words.js';
 
 /** @import { GameTask } from '../../page/cockpit/js/tasks/task_messages.js' */

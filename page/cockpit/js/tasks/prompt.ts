@@ -5,8 +5,33 @@
 import { painted } from '../painted.js';
 
 import type { GameTask, OpenPrompt, PageTimes } from './task_messages.js';
-import type { RunningTime } from './running_time.js';
 import type { ServerTime } from '../server_clock.js';
+
+/** A counter of the run's pauses, so that they do not count in the times of answers. */
+export class RunningTime {
+  #paused_ms = 0;
+  #since_ms = NaN;
+
+  /** Return whether the run stands still, according to the last status. */
+  get stands() {
+    return !Number.isNaN(this.#since_ms);
+  }
+
+  /** Record whether the run is running; `now_ms` from performance.now. */
+  note(runs: boolean, now_ms: number) {
+    if (runs && this.stands) {
+      this.#paused_ms += now_ms - this.#since_ms;
+      this.#since_ms = NaN;
+    } else if (!runs && !this.stands) {
+      this.#since_ms = now_ms;
+    }
+  }
+
+  /** Return the total pause since the page was loaded [ms]; `now_ms` from performance.now. */
+  paused(now_ms: number): number {
+    return this.#paused_ms + (this.stands ? Math.max(now_ms - this.#since_ms, 0) : 0);
+  }
+}
 
 /** A prompt from its message to its end. All times are those of performance.now [ms]. */
 export class Prompt {

@@ -5,8 +5,7 @@
 import { attends } from '../attending.js';
 import { labelsOf, languageOf, WORDS } from '../driver_words.js';
 import { Answers, keyName } from './answers.js';
-import { inPicture, Prompt } from './prompt.js';
-import { RunningTime } from './running_time.js';
+import { inPicture, Prompt, RunningTime } from './prompt.js';
 import { TaskView } from './task_view.js';
 
 import type { Connection } from '../connection.js';
