@@ -10,9 +10,9 @@ import { breakView, clockTime } from '../../page/desk/js/break_view.js';
 import { DeviceCheck } from '../../page/desk/js/device_check.js';
 import { Draft, draftName, forgetOtherDrafts } from
   '../../page/desk/js/draft.js';
-import { doubtWords, kindWords, stateWords } from '../../page/desk/js/item_words.js';
-import { entryWords, timeOfDay } from '../../page/desk/js/log_words.js';
 import { askReason } from '../../page/desk/js/reason_dialog.js';
+import { doubtWords, entryWords, kindWords, stateWords, timeOfDay } from
+  '../../page/desk/js/session_words.js';
 import { Words } from '../../page/desk/js/words.js';
 import { shippedWords } from './desk_words.mjs';
 import { click, expose, openPage, Pictures, textOf } from './dom_support.mjs';

@@ -5,10 +5,9 @@
 import { element, part, setAttribute, setText } from '../../cockpit/js/dom.js';
 import { local } from '../../cockpit/js/panels/memory.js';
 import { DeskConnection } from './desk_connection.js';
-import { doubtWords, kindWords, stateWords } from './item_words.js';
-import { entryWords, timeOfDay } from './log_words.js';
 import { stageAddress } from './drive_frame.js';
 import { askReason } from './reason_dialog.js';
+import { doubtWords, entryWords, kindWords, stateWords, timeOfDay } from './session_words.js';
 import { Words } from './words.js';
 
 import type { ReplyMessage } from '../../cockpit/js/messages.js';
