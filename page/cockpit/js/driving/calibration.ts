@@ -202,15 +202,10 @@ class CalibrationTest {
   };
   #gear = element('span', { class: 'hud-gear', text: 'D' });
   #tuning = element('div', { class: 'tuning' });
-  node;
-
-  constructor() {
-    const { steering, throttle, brake } = this.#bars;
-    this.node = element('div', { class: 'calibration-test', hidden: true },
-      element('div', { class: 'calibration-seen' }, brake.node, throttle.node, this.#wheel.node,
-        steering.node, this.#gear),
-      this.#tuning);
-  }
+  node = element('div', { class: 'calibration-test', hidden: true },
+    element('div', { class: 'calibration-seen' }, this.#bars.brake.node, this.#bars.throttle.node,
+      this.#wheel.node, this.#bars.steering.node, this.#gear),
+    this.#tuning);
 
   /** Show the effect of a sample; `profile`: null hides this view. */
   show(profile: Profile | null, sample?: Sample) {

@@ -20,11 +20,7 @@ export class ScenarioForm {
   #options = new Map<string, PlannerOptions>();
   #humans: string[] = [];
   #avs: string[] = [];
-  root;
-
-  constructor() {
-    this.root = element('div', { class: 'who' });
-  }
+  root = element('div', { class: 'who' });
 
   /**
    * @param preview answer of /api/preview

@@ -23,21 +23,18 @@ export class ScenarioList {
   #unwanted;
   #list = element('div', { class: 'scenario-list', role: 'radiogroup', 'aria-label': 'Scenario' });
   #nothing = element('p', { class: 'hint', hidden: true });
-  #filter;
+  #filter = element('input', {
+    type: 'search', placeholder: 'Filter by name', 'aria-label': 'Filter the scenarios',
+    on: { input: () => this.#sift() },
+  });
   #entries = new Map<string, {
     entry: Entry; button: HTMLButtonElement; item: HTMLElement; words: string }>();
-  root;
+  root = element('div', { class: 'scenario-choice' }, this.#filter, this.#list, this.#nothing);
 
   /** `chosen` called with the chosen entry; `unwanted` called with the upload to delete. */
   constructor(chosen: (entry: Entry) => void, unwanted: (entry: Entry) => void) {
     this.#chosen = chosen;
     this.#unwanted = unwanted;
-    this.#filter = element('input', {
-      type: 'search', placeholder: 'Filter by name', 'aria-label': 'Filter the scenarios',
-      on: { input: () => this.#sift() },
-    });
-    this.root = element('div', { class: 'scenario-choice' }, this.#filter, this.#list,
-      this.#nothing);
   }
 
   /** `folders` of /api/scenarios; `chosen`: id of the entry that is marked, empty for none. */

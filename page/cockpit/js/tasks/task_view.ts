@@ -13,38 +13,26 @@ const WHEEL = 'M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18m0 2.2a6.8 6.8 0 0 1 6.7 5.6h-
 
 /** The driver's view of tasks, without any logic. */
 export class TaskView {
-  light;
-  title;
-  label;
-  hint;
-  takeButton;
-  request;
-  frame;
-  note;
-  answerButton;
-  corner;
-  root;
+  light = element('div', { class: 'task-light', role: 'img', hidden: true });
+  title = element('strong', { class: 'task-title' });
+  label = element('span', { class: 'task-label' });
+  hint = element('span', { class: 'task-hint' });
+  takeButton = element('button', { type: 'button', class: 'task-take' });
+  request = element('div', { class: 'task-request', role: 'alert', hidden: true },
+    svg('svg', { viewBox: '0 0 24 24', class: 'task-sign', 'aria-hidden': 'true' },
+      svg('path', { d: WHEEL })),
+    element('div', { class: 'task-words' }, this.title, this.label, this.hint), this.takeButton);
+  frame = element('div', { class: 'task-frame', 'aria-hidden': 'true', hidden: true });
+  note = element('p', { class: 'task-note', role: 'status', hidden: true });
+  answerButton = element('button', { type: 'button', class: 'task-answer', tabindex: '-1',
+    hidden: true });
+  corner = element('div', { class: 'task-corner', 'aria-hidden': 'true', hidden: true });
+  // The light comes last, so that nothing hides it.
+  root = element('div', { id: 'tasks' }, this.frame, this.note, this.request, this.answerButton,
+    this.light, this.corner);
 
   /** @param stage that it covers */
   constructor(stage: HTMLElement) {
-    this.light = element('div', { class: 'task-light', role: 'img', hidden: true });
-    this.title = element('strong', { class: 'task-title' });
-    this.label = element('span', { class: 'task-label' });
-    this.hint = element('span', { class: 'task-hint' });
-    this.takeButton = element('button', { type: 'button', class: 'task-take' });
-    const sign = svg('svg', { viewBox: '0 0 24 24', class: 'task-sign', 'aria-hidden': 'true' },
-      svg('path', { d: WHEEL }));
-    this.request = element('div', { class: 'task-request', role: 'alert', hidden: true }, sign,
-      element('div', { class: 'task-words' }, this.title, this.label, this.hint),
-      this.takeButton);
-    this.frame = element('div', { class: 'task-frame', 'aria-hidden': 'true', hidden: true });
-    this.note = element('p', { class: 'task-note', role: 'status', hidden: true });
-    this.answerButton = element('button', { type: 'button', class: 'task-answer', tabindex: '-1',
-      hidden: true });
-    this.corner = element('div', { class: 'task-corner', 'aria-hidden': 'true', hidden: true });
-    // The light comes last, so that nothing hides it.
-    this.root = element('div', { id: 'tasks' }, this.frame, this.note, this.request,
-      this.answerButton, this.light, this.corner);
     stage.append(this.root);
   }
 
