@@ -118,17 +118,8 @@ export class SeenInstances {
     this.#count += 1;
   }
 
-  /** Submit all of them, visible or not. */
-  seeAll() {
-    this.#choose(null);
-  }
-
-  /** Submit those that a camera sees. */
-  see(sight: Sight) {
-    this.#choose(sight);
-  }
-
-  #choose(sight: Sight | null) {
+  /** Submit those that a camera sees; without a sight all, visible or not. */
+  see(sight: Sight | null) {
     let near = 0;
     this.#far?.begin();
     for (let i = 0; i < this.#count; i += 1) {

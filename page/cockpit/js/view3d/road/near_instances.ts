@@ -81,7 +81,7 @@ export class NearInstances {
         new Vector3(...instance.size));
       this.#seen.add(matrix, color.set(instance.color), false);
     });
-    this.#seen.seeAll();
+    this.#seen.see(null);
   }
 
   /** @param sight of the camera that draws next */
