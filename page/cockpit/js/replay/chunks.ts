@@ -18,16 +18,13 @@ const RETRY_MS = 1000;
  * @throws {Error} with a readable text
  */
 export async function ask(path: string, query: Record<string, number>): Promise<Response> {
-  const answer = await fetch(`api/replay/${path}?${queryOf(query)}`);
+  const values = Object.entries(query).map(([name, value]) => [name, `${value}`]);
+  const answer = await fetch(`api/replay/${path}?${new URLSearchParams(values)}`);
   if (!answer.ok) {
     const { error } = await answer.json().catch(() => ({}));
     throw new Error(error ?? `The server answered ${answer.status}.`);
   }
   return answer;
-}
-
-function queryOf(query: Record<string, number>) {
-  return new URLSearchParams(Object.entries(query).map(([name, value]) => [name, `${value}`]));
 }
 
 /** Split packed frames; `packed`: frames, each after its length in bytes. */

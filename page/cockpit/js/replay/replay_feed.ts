@@ -105,19 +105,15 @@ export class ReplayFeed {
    */
   history(index: number, seconds: number): History {
     const past = emptyHistory();
-    const end = this.#shown + FUTURE_S;
-    for (let i = this.#outlineFrom(this.#shown - seconds); i < this.#outline.length; i += 1) {
-      if (this.#outline[i].t > end) {
+    const [first, end] = [this.#shown - seconds, this.#shown + FUTURE_S];
+    const from = countWhile(this.#outline.length, (i) => this.#outline[i].t < first);
+    for (const sample of this.#outline.slice(from)) {
+      if (sample.t > end) {
         break;
       }
-      addToHistory(past, this.#outline[i], index);
+      addToHistory(past, sample, index);
     }
     return past;
-  }
-
-  /** Find the first sample for plots that is not before a time. */
-  #outlineFrom(t: number) {
-    return countWhile(this.#outline.length, (index) => this.#outline[index].t < t);
   }
 
   /** Restart shortly before a time, with the frames of each kind that are still valid then. */
