@@ -11,6 +11,7 @@ import shutil
 import time
 from typing import Any, TYPE_CHECKING
 
+from crgame_ros.page_libraries import find_libraries
 import pytest
 
 if TYPE_CHECKING:
@@ -31,6 +32,12 @@ def missing_programs() -> list[str]:
     missing += [] if shutil.which('chromedriver') else ['chromedriver']
     missing += [] if importlib.util.find_spec('selenium') else ['the Python package selenium']
     return missing
+
+
+def skip_without_three() -> None:
+    """Skip a test of the 3D view where its library has not been fetched."""
+    if find_libraries() is None:
+        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
 
 
 def _chromium() -> str | None:

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 import math
 from typing import Any
 
-from browser_support import Browser
+from browser_support import Browser, skip_without_three
 from crgame_ros.cockpit.frames import encode_seen, Place
-from crgame_ros.page_libraries import find_libraries
 from crgame_ros.paths import scenarios_directory
 import numpy as np
 import pytest
@@ -50,8 +49,7 @@ def cockpit(run: RecordedRun) -> Iterator[Served]:
 @pytest.fixture
 def page(cockpit: Served, browser: Browser) -> Browser:
     """Open the page, and keep its messages to the server about its picture."""
-    if find_libraries() is None:
-        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
+    skip_without_three()
     browser.open(cockpit.address)
     browser.wait('window.crgame?.ready && crgame.world.shown && crgame.store.me.id')
     browser.run("""

@@ -5,8 +5,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from browser_support import Browser
-from crgame_ros.page_libraries import find_libraries
+from browser_support import Browser, skip_without_three
 from crgame_ros.paths import scenarios_directory
 import pytest
 from world_support import RecordedRun, RunBackend, Served, served
@@ -62,8 +61,7 @@ def cockpit() -> Iterator[Served]:
 @pytest.fixture(scope='module')
 def pictures(cockpit: Served, module_browser: Browser) -> dict[str, Any]:
     """Return the measurements by day, at dusk and in fog."""
-    if find_libraries() is None:
-        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
+    skip_without_three()
     page = module_browser
     page.resize(640, 400)
     page.open(cockpit.address)

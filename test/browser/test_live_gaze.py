@@ -7,12 +7,11 @@ import math
 from pathlib import Path
 import threading
 
-from browser_support import Browser
+from browser_support import Browser, skip_without_three
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.run_tables import tables_of
 from crgame_ros.game.view_documents import VIEW_PICTURE
 from crgame_ros.instruments.outlets import CONFIGURATION
-from crgame_ros.page_libraries import find_libraries
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import run_folder
 from live_browser_support import Graph, live_graph, LivePage, SCENARIOS
@@ -82,8 +81,7 @@ socket.close();
 @pytest.fixture(scope='module')
 def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
     """Keep one graph, whose run waits for a driver in a browser."""
-    if find_libraries() is None:
-        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
+    skip_without_three()
     pylsl.set_config_content(CONFIGURATION)
     folder = tmp_path_factory.mktemp('gaze')
     (folder / 'game.yaml').write_text(GAME)

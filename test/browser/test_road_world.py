@@ -8,13 +8,12 @@ import math
 from pathlib import Path
 from typing import Any
 
-from browser_support import Browser
+from browser_support import Browser, skip_without_three
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.game.documents import GAME
 from crgame_ros.game.game import load_game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
-from crgame_ros.page_libraries import find_libraries
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.run_texts import describe_game
 from crgame_ros.simulation.setup import build_setup
@@ -72,8 +71,7 @@ return [...pixels];
 @pytest.fixture(scope='module')
 def page(module_browser: Browser) -> Iterator[Browser]:
     """Open a page, and make a renderer in it."""
-    if find_libraries() is None:
-        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
+    skip_without_three()
     run = RecordedRun(scenarios_directory() / 'cut_in.yaml', 0.1)
     with served(RunBackend(run)) as server:
         module_browser.open(server.address)

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 import os
 from pathlib import Path
 
-from browser_support import Browser
-from crgame_ros.page_libraries import find_libraries
+from browser_support import Browser, skip_without_three
 from crgame_ros.paths import scenarios_directory
 import numpy as np
 import pytest
@@ -42,8 +41,7 @@ def cockpit() -> Iterator[Served]:
 def test_two_side_windows_show_the_time_of_the_main_one(
         cockpit: Served, browser: Browser, tmp_path: Path) -> None:
     """At any moment the three pictures are at most one picture apart."""
-    if find_libraries() is None:
-        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
+    skip_without_three()
     driver = browser.driver
     main = driver.current_window_handle
     browser.resize(480, 300)

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 import math
 from typing import Any
 
-from browser_support import Browser
+from browser_support import Browser, skip_without_three
 from crgame_ros.cockpit import page_files
-from crgame_ros.page_libraries import find_libraries
 from crgame_ros.paths import scenarios_directory
 import numpy as np
 from numpy.typing import NDArray
@@ -68,8 +67,7 @@ def cockpit(run: RecordedRun) -> Iterator[Served]:
 @pytest.fixture(scope='module')
 def page(cockpit: Served, module_browser: Browser) -> Browser:
     """Return a page with an open 3D view, in a small window to save time."""
-    if find_libraries() is None:
-        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
+    skip_without_three()
     module_browser.resize(640, 400)
     module_browser.open(cockpit.address)
     module_browser.wait('crgame.ready && crgame.store.scene && crgame.store.latest')

@@ -5,8 +5,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from browser_support import Browser
-from crgame_ros.page_libraries import find_libraries
+from browser_support import Browser, skip_without_three
 from crgame_ros.paths import scenarios_directory
 import pytest
 from world_support import RecordedRun, RunBackend, Served, served
@@ -59,8 +58,7 @@ def cockpit() -> Iterator[Served]:
 @pytest.fixture(params=['', '?stage=hv0'], ids=['page', 'stage'])
 def phone(cockpit: Served, browser: Browser, request: pytest.FixtureRequest) -> Iterator[Browser]:
     """Open the driver's view of a seat with touch input, in the page and on its own."""
-    if find_libraries() is None:
-        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
+    skip_without_three()
     driver = browser.driver
     driver.execute_cdp_cmd('Emulation.setTouchEmulationEnabled',
                            {'enabled': True, 'maxTouchPoints': 5})

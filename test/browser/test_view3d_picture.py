@@ -7,8 +7,7 @@ import math
 from pathlib import Path
 import time
 
-from browser_support import Browser
-from crgame_ros.page_libraries import find_libraries
+from browser_support import Browser, skip_without_three
 from crgame_ros.paths import scenarios_directory
 from PIL import Image
 import pytest
@@ -85,8 +84,7 @@ def cockpit(run: RecordedRun) -> Iterator[Served]:
 @pytest.fixture
 def page(cockpit: Served, browser: Browser) -> Browser:
     """Return a page whose 3D view is open."""
-    if find_libraries() is None:
-        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
+    skip_without_three()
     browser.resize(800, 500)
     browser.open(cockpit.address)
     browser.wait('window.crgame?.ready && crgame.store.scene && crgame.store.latest')
