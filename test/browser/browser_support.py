@@ -7,6 +7,7 @@ from contextlib import contextmanager
 import importlib.util
 import os
 from pathlib import Path
+import re
 import shutil
 import time
 from typing import Any, TYPE_CHECKING
@@ -61,6 +62,26 @@ document.addEventListener('click', ({target}) => {
 }, {capture: true, once: true});
 return place;
 """
+
+
+# The colour of an element, and that of the ground behind it.
+_COLOURS = """
+const node = document.querySelector(arguments[0]);
+let ground = node;
+while (getComputedStyle(ground).backgroundColor === 'rgba(0, 0, 0, 0)') {
+  ground = ground.parentElement;
+}
+const own = getComputedStyle(node);
+return [node instanceof SVGElement ? own.fill : own.color,
+        getComputedStyle(ground).backgroundColor];
+"""
+
+
+def _luminance(colour: str) -> float:
+    parts = [int(part) / 255.0 for part in re.findall(r'\d+', colour)[:3]]
+    red, green, blue = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4
+                        for part in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
 class Browser:
@@ -169,6 +190,24 @@ class Browser:
         """Wait until the page has drawn what it has received so far."""
         self.run_async('await new Promise((done) => requestAnimationFrame(() =>'
                        ' requestAnimationFrame(done)));')
+
+    def contrast(self, selector: str) -> float:
+        """Return the ratio of an element's colour to its background as WCAG 2 defines it."""
+        colours = self.run(_COLOURS, selector)
+        low, high = sorted(map(_luminance, colours))
+        return (high + 0.05) / (low + 0.05)
+
+    @contextmanager
+    def offline(self) -> Iterator[None]:
+        """Take the network away, and check afterwards that no error occurred."""
+        # The log of requests lists all that the page requests.
+        self.driver.execute_cdp_cmd('Network.enable', {})
+        self.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
+            'offline': True, 'latency': 0, 'downloadThroughput': 0, 'uploadThroughput': 0})
+        yield
+        self.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
+            'offline': False, 'latency': 0, 'downloadThroughput': -1, 'uploadThroughput': -1})
+        assert self.console_errors() == []
 
     def console_errors(self) -> list[str]:
         """Return every error that the page has logged since it was opened, also thrown ones."""

@@ -40,15 +40,9 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def shown(browser: Browser, file: Path) -> Iterator[Browser]:
     """Open the report without network, and check that no error occurred."""
-    # The log of requests lists all that the page requests.
-    browser.driver.execute_cdp_cmd('Network.enable', {})
-    browser.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
-        'offline': True, 'latency': 0, 'downloadThroughput': 0, 'uploadThroughput': 0})
-    browser.open(file.as_uri())
-    yield browser
-    browser.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
-        'offline': False, 'latency': 0, 'downloadThroughput': -1, 'uploadThroughput': -1})
-    assert browser.console_errors() == []
+    with browser.offline():
+        browser.open(file.as_uri())
+        yield browser
 
 
 def _look_at_all(browser: Browser) -> None:
@@ -119,26 +113,7 @@ def test_it_fits_and_can_be_read(shown: Browser, file: Path, width: int, height:
     _look_at_all(shown)
     assert shown.run('return document.documentElement.scrollWidth') <= width
     for selector in ('body', '.lead', '.note', 'a', 'thead th', '.critical'):
-        text, ground = shown.run("""
-            const node = document.querySelector(arguments[0]);
-            let ground = node;
-            while (getComputedStyle(ground).backgroundColor === 'rgba(0, 0, 0, 0)') {
-              ground = ground.parentElement;
-            }
-            return [getComputedStyle(node).color, getComputedStyle(ground).backgroundColor];
-            """, selector)
-        assert _contrast(text, ground) >= 4.5, (selector, text, ground)
-
-
-def _contrast(first: str, second: str) -> float:
-    """Return the ratio of two colours as WCAG 2 defines it."""
-    def luminance(colour: str) -> float:
-        parts = [int(part) / 255.0 for part in re.findall(r'\d+', colour)[:3]]
-        red, green, blue = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4
-                            for part in parts)
-        return 0.2126 * red + 0.7152 * green + 0.0722 * blue
-    low, high = sorted((luminance(first), luminance(second)))
-    return (high + 0.05) / (low + 0.05)
+        assert shown.contrast(selector) >= 4.5, selector
 
 
 @pytest.mark.exhaustive

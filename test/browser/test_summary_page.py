@@ -4,7 +4,6 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-import re
 import sys
 
 from browser_support import Browser
@@ -32,13 +31,8 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def offline(browser: Browser) -> Iterator[Browser]:
     """Return a browser without network."""
-    browser.driver.execute_cdp_cmd('Network.enable', {})
-    browser.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
-        'offline': True, 'latency': 0, 'downloadThroughput': 0, 'uploadThroughput': 0})
-    yield browser
-    browser.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
-        'offline': False, 'latency': 0, 'downloadThroughput': -1, 'uploadThroughput': -1})
-    assert browser.console_errors() == []
+    with browser.offline():
+        yield browser
 
 
 def test_it_fits_can_be_read_and_leads_to_reports(offline: Browser, page: Path) -> None:
@@ -52,31 +46,9 @@ def test_it_fits_can_be_read_and_leads_to_reports(offline: Browser, page: Path) 
                                 ('.commands', 4.5), ('.intervals text', 4.5),
                                 ('.intervals .tick', 4.5), ('.intervals circle.better', 3.0),
                                 ('.intervals circle.estimate', 3.0)):
-            assert _contrast(offline, selector) >= least, (scheme, selector)
+            assert offline.contrast(selector) >= least, (scheme, selector)
     assert offline.run('return performance.getEntriesByType("resource").length') == 0
     link = offline.driver.find_element('css selector', '#worst a')
     offline.run('arguments[0].scrollIntoView({ behavior: "instant", block: "center" })', link)
     link.click()
     offline.wait('document.title === "one cell"', 'the report of the worst cell')
-
-
-def _contrast(browser: Browser, selector: str) -> float:
-    """Return the contrast ratio of an element's colour to its background as in WCAG 2."""
-    colours = browser.run("""
-        const node = document.querySelector(arguments[0]);
-        let ground = node;
-        while (getComputedStyle(ground).backgroundColor === 'rgba(0, 0, 0, 0)') {
-          ground = ground.parentElement;
-        }
-        const own = getComputedStyle(node);
-        return [node instanceof SVGElement ? own.fill : own.color,
-                getComputedStyle(ground).backgroundColor];""", selector)
-    low, high = sorted(map(_luminance, colours))
-    return (high + 0.05) / (low + 0.05)
-
-
-def _luminance(colour: str) -> float:
-    parts = [int(part) / 255.0 for part in re.findall(r'\d+', colour)[:3]]
-    red, green, blue = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4
-                        for part in parts)
-    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
