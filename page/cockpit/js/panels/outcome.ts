@@ -11,7 +11,7 @@ import { icon } from './icons.js';
 import { figures, fileList, RunResult, table } from './outcome_card.js';
 
 import type { Connection } from '../connection.js';
-import type { Reply, RunAction, RunState } from '../messages.js';
+import type { RunAction, RunState } from '../messages.js';
 import type { Store } from '../store.js';
 import type { Result } from './outcome_card.js';
 
@@ -327,17 +327,13 @@ export class Outcome {
   #drive(seat: string) {
     const { driving } = window.crgame;
     if (driving !== undefined) {
-      this.#ask(driving.claim(seat));
+      tellRefusal(this.#store, driving.claim(seat));
     }
   }
 
-  #order(action: RunAction) {
-    return this.#ask(this.#connection.request({ type: 'control', action }));
-  }
-
   /** @returns whether it was done */
-  #ask(reply: Promise<Reply>): Promise<boolean> {
-    return tellRefusal(this.#store, reply);
+  #order(action: RunAction): Promise<boolean> {
+    return tellRefusal(this.#store, this.#connection.request({ type: 'control', action }));
   }
 }
 
