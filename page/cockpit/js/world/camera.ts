@@ -56,13 +56,12 @@ export class Camera {
   }
 
   get anchorY() {
-    return (this.#aim.down + this.#slack.down) * this.#free;
+    return this.#down * this.#free;
   }
 
   /** Return whether it is still moving. */
   get moves() {
-    const { x, y, scale, up, down } = this.#slack;
-    return x !== 0 || y !== 0 || scale !== 0 || up !== 0 || down !== 0;
+    return Object.values(this.#slack).some((value) => value !== 0);
   }
 
   /**
@@ -229,19 +228,18 @@ export class Camera {
   }
 
   #send(aim: Partial<Aim>, animated: boolean) {
-    const before = { x: this.x, y: this.y, scale: this.scale, up: this.up, down: this.#down() };
-    Object.assign(this.#aim, aim);
-    this.#aim.scale = clamp(this.#aim.scale, MIN_SCALE, MAX_SCALE);
-    const glide = animated && !this.#still.matches;
-    this.#slack.x = glide ? before.x - this.#aim.x : 0;
-    this.#slack.y = glide ? before.y - this.#aim.y : 0;
-    this.#slack.scale = glide ? Math.log(before.scale / this.#aim.scale) : 0;
-    this.#slack.up = glide ? turn(0, before.up - this.#aim.up, 1) : 0;
-    this.#slack.down = glide ? before.down - this.#aim.down : 0;
+    const down = this.#down;
+    const to = Object.assign(this.#aim, aim);
+    to.scale = clamp(to.scale, MIN_SCALE, MAX_SCALE);
+    // Until it is applied, the view is the one before.
+    this.#slack = animated && !this.#still.matches ? {
+      x: this.x - to.x, y: this.y - to.y, scale: Math.log(this.scale / to.scale),
+      up: turn(0, this.up - to.up, 1), down: down - to.down,
+    } : { x: 0, y: 0, scale: 0, up: 0, down: 0 };
     this.#apply();
   }
 
-  #down() {
+  get #down() {
     return this.#aim.down + this.#slack.down;
   }
 
