@@ -23,7 +23,8 @@ const SWITCHES: { name: Switch; text: string; on: boolean }[] = [
 
 /** The settings and their form. */
 export class ViewSettings {
-  switches: Record<Switch, boolean> = { mirrors: true, inset: true, plans: false, sharp: false };
+  switches = Object.fromEntries(
+    SWITCHES.map(({ name, on }) => [name, on])) as Record<Switch, boolean>;
   fieldOfView_deg = FIELD_OF_VIEW.usual;
   seat: Seat | null = null;
   node;
