@@ -52,8 +52,7 @@ export class TrafficLights {
   #lights;
   #texture;
   #lamps;
-  #poles;
-  #housings;
+  #standing: NearInstances[]; // poles and housings
   #shown: (string | undefined)[];
 
   /** @param painted of poles and housings */
@@ -84,26 +83,26 @@ export class TrafficLights {
     this.#texture = plateTexture(three, masks.canvas);
     this.#lamps = new three.Mesh(geometry, new three.MeshBasicMaterial({
       vertexColors: true, map: this.#texture, alphaTest: 0.5, toneMapped: false }));
-    this.#poles = new NearInstances(three, geometryOf(three, poleShape()), painted,
-      lights.map((pole, i) => instance(pole, feet[i])).filter((_, i) => !lights[i].hangs), MOST,
-      REACH_M);
-    this.#housings = new NearInstances(three, geometryOf(three, housingShape()), painted,
-      lights.map((pole, i) => instance(pole, bases[i])), MOST, REACH_M);
+    const poles = lights.map((pole, i) => instance(pole, feet[i])).filter(
+      (_, i) => !lights[i].hangs);
+    const housings = lights.map((pole, i) => instance(pole, bases[i]));
+    this.#standing = [[poleShape(), poles] as const, [housingShape(), housings] as const].map(
+      ([shape, places]) => new NearInstances(three, geometryOf(three, shape), painted, places,
+        MOST, REACH_M));
     this.update({}, { x: 0, y: 0 });
   }
 
   get meshes() {
-    return [this.#lamps, ...this.#poles.meshes, ...this.#housings.meshes];
+    return [this.#lamps, ...this.#standing.flatMap(({ meshes }) => meshes)];
   }
 
   get triangles() {
-    return 6 * this.#lights.length + this.#poles.triangles + this.#housings.triangles;
+    return this.#standing.reduce((sum, { triangles }) => sum + triangles, 6 * this.#lights.length);
   }
 
   /** Show the signals; `states` by the lights' ids. */
   update(states: Record<string, string>, eye: { x: number; y: number }) {
-    this.#poles.update(eye);
-    this.#housings.update(eye);
+    this.#standing.forEach((part) => part.update(eye));
     const colors = this.#lamps.geometry.attributes.color as BufferAttribute;
     const color = new this.#three.Color();
     this.#lights.forEach(({ light }, i) => {
@@ -124,8 +123,7 @@ export class TrafficLights {
 
   /** @param sight of the camera that draws next */
   see(sight: Sight) {
-    this.#poles.see(sight);
-    this.#housings.see(sight);
+    this.#standing.forEach((part) => part.see(sight));
   }
 
   /** Free the memory of the graphics card. */
@@ -133,8 +131,7 @@ export class TrafficLights {
     this.#texture.dispose();
     this.#lamps.geometry.dispose();
     this.#lamps.material.dispose();
-    this.#poles.dispose();
-    this.#housings.dispose();
+    this.#standing.forEach((part) => part.dispose());
   }
 }
 
