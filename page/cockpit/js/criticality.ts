@@ -39,7 +39,6 @@ export class CriticalityLog {
     fetch?.();
   }
 
-  /** Remove all frames. */
   clear() {
     this.#frames = [];
     this.#worsts.clear();

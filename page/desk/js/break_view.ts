@@ -8,7 +8,6 @@ import { button } from './page_view.js';
 import type { BreakDocument } from './desk_messages.js';
 import type { Words } from './words.js';
 
-/** Build the view. */
 export function breakView({ text, left_s }: BreakDocument, words: Words,
   finish: () => void): HTMLElement {
   const over_ms = performance.now() + 1000 * left_s;

@@ -51,7 +51,6 @@ export class DriveFrame {
     return this.#state;
   }
 
-  /** Show a drive. */
   show(shown: DriveDocument) {
     const entered = shown.phase !== this.#phase || this.#root.hidden;
     this.#root.hidden = false;

@@ -21,7 +21,6 @@ const LANGUAGE_KEY = 'crgame.desk.language';
 
 type Received = ExperimenterDocument | ExperimenterWords | ReplyMessage;
 
-/** The whole page. */
 class ExperimenterPage {
   #words = new Words();
   #language = '';

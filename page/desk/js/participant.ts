@@ -23,7 +23,6 @@ const PAGE_KEY = 'crgame.desk.page';
 
 type Received = DeskDocument | WordsMessage | RefusedMessage;
 
-/** The whole page. */
 class ParticipantPage {
   #words = new Words();
   #sheet = part(document.body, 'sheet');

@@ -12,20 +12,16 @@ export async function fetchRuns(): Promise<PastRun[]> {
   return (await ask<{ runs: PastRun[] }>('/api/runs')).runs;
 }
 
-/** @param id of a run */
 export function fetchScore(id: string): Promise<Score> {
   return ask(`/api/runs/score?id=${encodeURIComponent(id)}`);
 }
 
-/** @param id of a run */
 export function deleteRun(id: string): Promise<Reply> {
   return post('/api/runs/delete', { id });
 }
 
-/** @param id of a run */
 export const pictureAddress = (id: string) => `/api/runs/picture?id=${encodeURIComponent(id)}`;
 
-/** @param id of a run */
 export const zipAddress = (id: string) => `/api/runs/zip?id=${encodeURIComponent(id)}`;
 
 /** `id` of a run; `name` of one of its files. */
@@ -35,6 +31,5 @@ export const fileAddress = (id: string, name: string) => (
 /** @param id of a run */
 export const replayAddress = (id: string) => `/replay/${encodeURIComponent(id)}/`;
 
-/** @param ids of runs */
 export const comparisonAddress = (ids: string[]) => (
   `/api/runs/comparison?ids=${ids.map(encodeURIComponent).join(',')}`);

@@ -296,7 +296,6 @@ class Keycaps {
     }
   }
 
-  /** @param code of CAPS */
   #cap(code: string): HTMLElement {
     return this.#caps.get(code) as HTMLElement;
   }

@@ -11,7 +11,6 @@ import type { Store } from '../store.js';
 const KEY = 'crgame.name';
 const LONGEST = 40;
 
-/** Make the field. */
 export function nameField(store: Store, connection: Connection): HTMLElement {
   const input = element('input', { type: 'text', id: 'my-name', maxlength: LONGEST,
     autocomplete: 'nickname', placeholder: 'Your name' });

@@ -61,7 +61,6 @@ export class Chart {
       [title, unit, name, t, y[i] ?? NaN])).filter((row) => Number.isFinite(row[4])));
   }
 
-  /** Draw. */
   update(traces: Trace[], view: ChartView) {
     this.#traces = traces;
     this.#showValues(traces);

@@ -308,7 +308,6 @@ function childrenOf(root: HTMLElement): HTMLElement[] {
   return [...root.children] as HTMLElement[];
 }
 
-/** Make the panel. */
 export function createHistory(root: HTMLElement, store: Store): HistoryPanel {
   return new HistoryPanel(root, store, QUANTITIES);
 }

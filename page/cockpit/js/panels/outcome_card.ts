@@ -77,7 +77,6 @@ export function part(contact: Contact, files: Files | null) {
       + `${oneLine(named.avoidable_by)})`;
 }
 
-/** @param remark = () => '' */
 function listed<Item extends { t: number }>(items: Item[], name: (item: Item) => string,
   remark: (item: Item) => string = () => '') {
   if (items.length === 0) {
@@ -158,7 +157,6 @@ export class RunResult {
     this.#files = null;
   }
 
-  /** Return the result. */
   of(status: Status, scene: Scene): Result {
     const over = status.run === 'ended';
     const files = over && this.#files?.epoch === status.epoch ? this.#files : null;

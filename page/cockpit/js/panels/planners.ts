@@ -33,7 +33,6 @@ const ERRORS: [name: string, factor: number, unit: string, digits: number][] = [
   ['heading', DEGREES, '°', 1], ['speed', 1, 'm/s', 2],
 ];
 
-/** Make the table. */
 export function createPlanners(root: HTMLElement, store: Store, connection: Connection) {
   const empty = element('p', { class: 'hint', text: 'No autonomous vehicle takes part.' });
   const table = element('table', { class: 'planners' },

@@ -338,7 +338,6 @@ function busyBar() {
       }
       show();
     },
-    /** Hide it. */
     end() {
       clearInterval(timer);
       timer = 0;

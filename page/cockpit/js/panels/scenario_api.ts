@@ -39,7 +39,6 @@ export async function upload(file: File): Promise<string> {
   return reply.id;
 }
 
-/** @param id of an upload */
 export function deleteUpload(id: string): Promise<Reply> {
   return post('/api/upload/delete', { id });
 }

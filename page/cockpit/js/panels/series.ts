@@ -100,7 +100,6 @@ export class HealthLog {
     this.#keeps_s = keeps_s;
   }
 
-  /** Remove all rows. */
   clear() {
     this.#rows = [];
   }

@@ -61,7 +61,6 @@ const MORE: Figure[] = [
   ['duration_s', 'Duration', 'measured', (value) => `${fixed(value, 1)} s`],
 ];
 
-/** Make the figures. */
 export function createTiming(root: HTMLElement, store: Store) {
   const hint = element('p', { class: 'hint', text: 'Measured from the second step on.' });
   const run: Rows = new Map();

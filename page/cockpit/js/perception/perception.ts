@@ -270,7 +270,6 @@ function createLegend(stage: HTMLElement) {
 const LEAST_PX = 0.75;
 const COARSEST = 6;
 
-/** Of detail. */
 interface Level {
   coarseness: number; // its cells are 2 to the power of this as long as the map's
   rows: number;

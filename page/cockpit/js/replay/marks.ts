@@ -24,11 +24,7 @@ const KINDS = new Map<string, [shape: string, word: string]>([
 ]);
 const OTHER: [shape: string, word: string] = ['M4 0H8V12H4Z', ''];
 
-/**
- * Return the text of an event.
- * @param event of the replay's info
- * @returns kind, subject, text, count and time
- */
+/** Return an event's time, kind, subject, text and count as text. */
 export function eventText({ kind, subject, text, count, t }: ReplayMark): string {
   const [, word] = KINDS.get(kind) ?? OTHER;
   const head = `${word || kind.replaceAll('_', ' ')}${subject ? ` (${subject})` : ''}`;
@@ -36,12 +32,7 @@ export function eventText({ kind, subject, text, count, t }: ReplayMark): string
   return `${t.toFixed(2)} s  ${head}${text ? `: ${text}` : ''}${times}`;
 }
 
-/**
- * Draw the mark of an event.
- * @param event of the replay's info
- * @param share where on the time line, 0 to 1
- * @param chosen called when it is clicked
- */
+/** Draw the mark of an event; `share`: where on the time line, 0 to 1. */
 export function mark(event: ReplayMark, share: number, chosen: () => void): HTMLElement {
   const [shape] = KINDS.get(event.kind) ?? OTHER;
   // Not in the tab order: [ and ] lead from one to the next.

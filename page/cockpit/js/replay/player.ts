@@ -124,12 +124,10 @@ export class Player {
     }
   }
 
-  /** Pause. */
   pause() {
     this.#playing = false;
   }
 
-  /** Play or pause. */
   toggle() {
     if (this.#playing) {
       this.pause();

@@ -9,7 +9,6 @@
 
 import type { TaskDone } from '../page_messages.js';
 
-/** A task of the game. */
 export interface GameTask {
   name: string;
   kind: 'detection_response' | 'take_over' | 'secondary_task';

@@ -46,7 +46,6 @@ export class Tasks {
     this.#begin();
   }
 
-  /** @returns the open prompts */
   get prompts(): Prompt[] {
     return [...this.#prompts.values()];
   }
@@ -324,7 +323,6 @@ class RequestTone {
     }
   }
 
-  /** Stop the tone. */
   stop() {
     for (const each of this.#sounding) {
       each.stop();

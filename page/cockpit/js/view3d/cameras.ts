@@ -16,7 +16,6 @@ const CHASE_PITCH = -12 * DEGREE;
 const BIRD_ABOVE_M = 55;
 const BIRD_AHEAD_M = 12;
 
-/** The viewpoints. */
 export const VIEWPOINTS = ['driver', 'chase', 'bird'] as const;
 
 export type Viewpoint = typeof VIEWPOINTS[number];

@@ -90,7 +90,6 @@ export class MergedMesh {
     this.mesh.visible = false;
   }
 
-  /** Begin a picture. */
   begin() {
     this.#count = 0;
   }

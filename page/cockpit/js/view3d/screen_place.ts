@@ -26,7 +26,6 @@ export class ScreenPlace {
     window.addEventListener('resize', () => { this.#inWindow = null; });
   }
 
-  /** Return the place of an element. */
   of(node: HTMLElement): ViewPlace {
     const { left, top, width, height } = node.getBoundingClientRect();
     const border = Math.max((window.outerWidth - window.innerWidth) / 2, 0);

@@ -46,7 +46,6 @@ export type HeightAt = (x: number, y: number) => number; // of the road at a poi
 export class Traffic {
   /** Whether bodies have the map's colours, which show what drives them. */
   byRole = false;
-  /** Whether `placed` is kept. */
   keepsPlaces = false;
   /** The bodies as they were placed last; null while they are not kept. */
   placed: PlacedBody[] | null = null;

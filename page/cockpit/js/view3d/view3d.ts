@@ -81,7 +81,6 @@ export class View3d {
     return this.#on;
   }
 
-  /** Return the viewpoint. */
   get viewpoint() {
     return this.#viewpoint;
   }

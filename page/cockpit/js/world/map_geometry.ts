@@ -71,7 +71,6 @@ function emptyChunk(x: number, y: number): Chunk {
   };
 }
 
-/** Return the surface of a lanelet. */
 export function surfaceOf(
   { types, intersection }: Pick<Lanelet, 'types' | 'intersection'>): Surface {
   const special = types.find((type) => type in SURFACE_OF_TYPE);

@@ -76,7 +76,6 @@ export class Painter {
     }
   }
 
-  /** Paint one frame. */
   paint(context: CanvasRenderingContext2D, view: View) {
     context.globalAlpha = 1;
     this.map.draw(context, view);

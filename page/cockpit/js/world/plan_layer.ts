@@ -33,7 +33,6 @@ export function shownPlans({ scene, fired, plans }: Store, shown: Shown): PlanFr
   });
 }
 
-/** The layer of plans. */
 export class PlanLayer {
   on = true;
 

@@ -137,7 +137,6 @@ export function truck({ front, rear }: Axles = { front: 3.65, rear: -3.1 }): Bod
     lamps: { front: [l + 0.01, 0.8 * w, 0.62], rear: [-l, 0.8 * w, 0.8], size: [0.34, 0.16] } };
 }
 
-/** A city bus. */
 export function bus({ front, rear }: Axles = { front: 3.3, rear: -2.7 }): Body {
   const [length, width, height] = [12, 2.55, 3.1];
   const l = length / 2;

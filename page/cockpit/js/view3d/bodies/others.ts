@@ -14,7 +14,6 @@ const SKIN: Tint = [0.75, 0.55, 0.42];
 const CLOTH: Tint = [0.1, 0.13, 0.2];
 const SIDES = 10;
 
-/** A bicycle with its rider. */
 export function bicycle(): Body {
   const mesh = new MeshBuilder()
     .box([-0.5, -0.02, 0.5], [0.45, 0.02, 0.56], METAL)
@@ -27,7 +26,6 @@ export function bicycle(): Body {
     wheels: { front: 0.52, rear: -0.52, track: 0.03, radius: 0.34, width: 0.04 } };
 }
 
-/** A motorcycle with its rider. */
 export function motorcycle(): Body {
   const mesh = new MeshBuilder()
     .box([-0.55, -0.17, 0.42], [0.35, 0.17, 0.72], DARK, { x: 0.05, y: 0.03 })
@@ -41,7 +39,6 @@ export function motorcycle(): Body {
     lamps: { front: [0.7, 0.04, 0.93], rear: [-0.86, 0.05, 0.8], size: [0.1, 0.1] } };
 }
 
-/** A pedestrian. */
 export function pedestrian(): Body {
   const mesh = new MeshBuilder();
   for (const side of [-1, 1]) {

@@ -62,7 +62,6 @@ export function paintedMaterial(three: Three, map: DataTexture | null): MeshLamb
   return ranked(new three.MeshLambertMaterial({ vertexColors: true, map }));
 }
 
-/** Return the geometry of parts. */
 export function geometryOf(three: Three,
   { positions, normals, colors, ranks, indices }: MeshParts): BufferGeometry {
   const geometry = new three.BufferGeometry();

@@ -96,7 +96,6 @@ function tree() {
   return parts;
 }
 
-/** A fir. */
 function fir() {
   const parts = shapeParts();
   addRound(parts, [[0.05, -0.05], [0.04, 0.25]], COLOR.bark);

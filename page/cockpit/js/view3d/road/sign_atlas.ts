@@ -48,7 +48,6 @@ export class SignAtlas {
     this.canvas.height = CELL_PX * ROWS;
   }
 
-  /** Return the place of a face. */
   cellOf(face: Face): Cell {
     return this.#cell(JSON.stringify(face), (context) => drawFace(context, face));
   }
