@@ -7,7 +7,7 @@ import {
   gearAfter, loadProfile, pedalValue, sampleOf, saveProfile, steeringValue,
 } from './gamepad_profile.js';
 
-import type { Control, Profile } from './gamepad_profile.js';
+import type { Profile } from './gamepad_profile.js';
 
 // A larger change of any axis or button is intended and not sensor noise.
 const MEANT = 0.2;
@@ -56,11 +56,10 @@ class Device {
 
   /** Return throttle, brake and steering after calibration. */
   get axes() {
-    const { throttle, brake, steering } = this.profile;
-    const pedal = (name: 'throttle' | 'brake', control: Control): number => (
-      this.rested[name] ? pedalValue(this.sample, control) : 0);
-    return [pedal('throttle', throttle), pedal('brake', brake),
-      steeringValue(this.sample, steering)].map((v) => Math.round(v * STEPS) / STEPS);
+    const pedals = PEDALS.map((name) => (
+      this.rested[name] ? pedalValue(this.sample, this.profile[name]) : 0));
+    return [...pedals, steeringValue(this.sample, this.profile.steering)].map(
+      (value) => Math.round(value * STEPS) / STEPS);
   }
 }
 
@@ -164,8 +163,9 @@ export class Gamepads {
     for (const pad of pads) {
       this.#devices.get(pad.index)?.read(pad);
     }
-    if (this.#active === null) {
-      this.#activateMoved();
+    const moved = this.#active === null ? this.devices.find((device) => device.moved) : undefined;
+    if (moved) {
+      this.#activate(moved);
     }
     if (this.#active) {
       this.#readGear(this.#active);
@@ -196,13 +196,6 @@ export class Gamepads {
     }
     if (listed) {
       this.#report.listed();
-    }
-  }
-
-  #activateMoved() {
-    const moved = this.devices.find((device) => device.moved);
-    if (moved) {
-      this.#activate(moved);
     }
   }
 
