@@ -5,7 +5,6 @@
 import { element, setAttribute, setText } from '../dom.js';
 import { reasonAgainst } from '../rights.js';
 import { confirm } from './confirm.js';
-import { acceptDrops } from './drop.js';
 import { errorText, oneLine, plural } from './format.js';
 import { icon } from './icons.js';
 import { deleteUpload, fetchPreview, fetchScenarios, load, upload } from './scenario_api.js';
@@ -274,6 +273,40 @@ function waitsForSeveral(store: Store) {
 
 function fieldError() {
   return element('p', { class: 'field-error', role: 'alert' });
+}
+
+/**
+ * Accept files that are dropped on the page, so that the browser does not open them.
+ * @param zone gets data-over while a drop would be accepted
+ * @param taken gets the files
+ */
+function acceptDrops(zone: HTMLElement, taken: (files: File[]) => void) {
+  const hasFiles = (event: DragEvent) => [...event.dataTransfer?.types ?? []].includes('Files');
+  const over = (event: DragEvent) => {
+    if (hasFiles(event)) {
+      event.preventDefault();
+      if (event.dataTransfer !== null) {
+        event.dataTransfer.dropEffect = 'copy';
+      }
+      zone.dataset.over = 'yes';
+    }
+  };
+  const leave = (event: DragEvent) => {
+    // Every element fires dragleave; only leaving the page has no related target.
+    if (event.relatedTarget === null) {
+      delete zone.dataset.over;
+    }
+  };
+  window.addEventListener('dragenter', over);
+  window.addEventListener('dragover', over);
+  window.addEventListener('dragleave', leave);
+  window.addEventListener('drop', (event) => {
+    delete zone.dataset.over;
+    if (hasFiles(event)) {
+      event.preventDefault();
+      taken([...event.dataTransfer?.files ?? []]);
+    }
+  });
 }
 
 function wrongFiles(files: File[]) {
