@@ -91,21 +91,20 @@ function addBand(context: CanvasRenderingContext2D, points: Float64Array, first:
   const nose = ahead + shape.length / 2;
   const endX = points[last] - x + nose * Math.cos(points[last + 2]);
   const endY = points[last + 1] - y + nose * Math.sin(points[last + 2]);
+  // A corner of the band to the left (1) or right (-1) of a pose on the plan.
+  const corner = (px: number, py: number, heading: number, side: number) => context.lineTo(
+    px - side * half * Math.sin(heading), py + side * half * Math.cos(heading));
   context.beginPath();
-  context.moveTo(-half * Math.sin(yaw), half * Math.cos(yaw));
+  corner(0, 0, yaw, 1);
   for (let i = first; i <= last; i += PLAN_WIDTH) {
-    context.lineTo(points[i] - x - half * Math.sin(points[i + 2]),
-      points[i + 1] - y + half * Math.cos(points[i + 2]));
+    corner(points[i] - x, points[i + 1] - y, points[i + 2], 1);
   }
-  context.lineTo(endX - half * Math.sin(points[last + 2]),
-    endY + half * Math.cos(points[last + 2]));
-  context.lineTo(endX + half * Math.sin(points[last + 2]),
-    endY - half * Math.cos(points[last + 2]));
+  corner(endX, endY, points[last + 2], 1);
+  corner(endX, endY, points[last + 2], -1);
   for (let i = last; i >= first; i -= PLAN_WIDTH) {
-    context.lineTo(points[i] - x + half * Math.sin(points[i + 2]),
-      points[i + 1] - y - half * Math.cos(points[i + 2]));
+    corner(points[i] - x, points[i + 1] - y, points[i + 2], -1);
   }
-  context.lineTo(half * Math.sin(yaw), -half * Math.cos(yaw));
+  corner(0, 0, yaw, -1);
   context.closePath();
 }
 
