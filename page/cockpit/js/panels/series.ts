@@ -21,6 +21,10 @@ export function thin(t: number[], values: number[], from: number,
   to: number): { x: number[]; y: Array<number | null> } {
   const x: number[] = [];
   const y: (number | null)[] = [];
+  const keep = (i: number) => {
+    x.push(t[i]);
+    y.push(Number.isFinite(values[i]) ? values[i] : null);
+  };
   const first = t.findIndex((time) => time >= from);
   let end = t.length;
   while (end > 0 && t[end - 1] > to) {
@@ -31,8 +35,7 @@ export function thin(t: number[], values: number[], from: number,
   }
   if (end - first <= MOST_POINTS) {
     for (let i = first; i < end; i += 1) {
-      x.push(t[i]);
-      y.push(Number.isFinite(values[i]) ? values[i] : null);
+      keep(i);
     }
     return { x, y };
   }
@@ -52,9 +55,9 @@ export function thin(t: number[], values: number[], from: number,
         high = next;
       }
     }
-    for (const at of low === high ? [low] : [Math.min(low, high), Math.max(low, high)]) {
-      x.push(t[at]);
-      y.push(Number.isFinite(values[at]) ? values[at] : null);
+    keep(Math.min(low, high));
+    if (low !== high) {
+      keep(Math.max(low, high));
     }
     i = next;
   }
