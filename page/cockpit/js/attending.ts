@@ -10,8 +10,9 @@ export function attends(store: Store, seat: string): boolean {
 }
 
 /** Return whether the person rides in an AV that its planner drives. */
-function rides({ seats, scene, rights }: Store, seat: string) {
+function rides(store: Store, seat: string) {
+  const { seats, rights } = store;
   const own = window.crgame.stage?.address.seat ?? rights.seat;
   return own === seat && rights.drives && seats[seat] !== undefined && !seats[seat].holder
-    && scene?.vehicles.find(({ id }) => id === seat)?.role === 'autonomous';
+    && store.vehicle(seat)?.role === 'autonomous';
 }

@@ -94,7 +94,7 @@ export class Seats {
     const { seats, scene, me, status, rights } = this.#store;
     const connected = this.#store.connected && !this.#stale;
     const seat = seats[id];
-    const role = scene?.vehicles.find((vehicle) => vehicle.id === id)?.role ?? 'human';
+    const role = this.#store.vehicle(id)?.role ?? 'human';
     return {
       id, role, connected, mine: connected && this.#store.holds(id),
       holder: seat.holder,

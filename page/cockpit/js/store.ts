@@ -18,8 +18,8 @@ import type { History } from './history.js';
 import type {
   Alarm, AlarmsMessage, DeviceDelay, EventsMessage, Exposure, FilesMessage, FiredEvent,
   HelloMessage, Measure, NoticeMessage, PeopleMessage, Present, Rights, RunState, Scene,
-  SceneMessage, Seat, SeatsMessage, SignalsMessage, Status, StatusMessage, StoreMessage,
-  YouMessage,
+  SceneMessage, SceneVehicle, Seat, SeatsMessage, SignalsMessage, Status, StatusMessage,
+  StoreMessage, YouMessage,
 } from './messages.js';
 import type { TasksMessage } from './tasks/task_messages.js';
 
@@ -307,6 +307,11 @@ export class Store {
   /** Return the ids of the vehicles that the person at this page drives: one, save in between. */
   get own(): string[] {
     return Object.keys(this.seats).filter((id) => this.holds(id));
+  }
+
+  /** Return a vehicle of the scene, undefined when there is none. */
+  vehicle(id: string | null | undefined): SceneVehicle | undefined {
+    return this.scene?.vehicles.find((vehicle) => vehicle.id === id);
   }
 
   /** Return a vehicle's index in the scene and in STATE, -1 when there is none. */

@@ -239,9 +239,8 @@ export class Driving {
       const name = seats[id].holder_name;
       return name ? `Driven by ${name} in a cockpit` : 'Driven in a cockpit';
     }
-    const role = scene?.vehicles[this.#store.vehicleIndex(id)]?.role;
     return connected && seats[id]
-      ? describeSeat(seats[id], role, scene?.planners?.[id], me.id) : '';
+      ? describeSeat(seats[id], this.#store.vehicle(id)?.role, scene?.planners?.[id], me.id) : '';
   }
 }
 

@@ -6,7 +6,7 @@ import { element, part, setText } from '../dom.js';
 import { clockTime, oneLine } from './format.js';
 import { icon } from './icons.js';
 
-import type { Alarm, Scene } from '../messages.js';
+import type { Alarm } from '../messages.js';
 import type { Store } from '../store.js';
 
 // kind: [word for the header, urgent]. Urgent ones frame the whole world, others mark its top.
@@ -70,14 +70,14 @@ export function createAlarms(root: HTMLElement, store: Store): { kinds: () => st
       clearTimeout(entry.timer);
       Object.assign(entry, alarm, { known: entry.known && !entry.ended, ended: false,
         mine: concerns(alarm, store) });
-      describe(entry, store.scene);
+      describe(entry, store);
     }
     const ids = new Set(active.map((alarm) => alarm.id));
     for (const [id, entry] of alarms) {
       if (!ids.has(id) && !entry.ended) {
         entry.ended = true;
         entry.timer = setTimeout(() => remove(id), LINGERS_MS);
-        describe(entry, store.scene);
+        describe(entry, store);
       }
     }
     paint(frame, signs, alarms);
@@ -98,11 +98,9 @@ export function createAlarms(root: HTMLElement, store: Store): { kinds: () => st
  * Return whether an alarm concerns the vehicle that this page drives or, without one, follows.
  * An alarm that is not about a vehicle concerns every page.
  */
-function concerns({ subject }: Alarm, { scene, own }: Store) {
-  if (!scene?.vehicles.some(({ id }) => id === subject)) {
-    return true;
-  }
-  return subject === (own[0] ?? window.crgame?.world?.followed ?? subject);
+function concerns({ subject }: Alarm, store: Store) {
+  return store.vehicle(subject) === undefined
+    || subject === (store.own[0] ?? window.crgame?.world?.followed ?? subject);
 }
 
 /** Return the page's own alarms: that the server has become silent. */
@@ -121,7 +119,7 @@ function makeChip(alarm: Alarm): Chip {
   return { chip, says, whom };
 }
 
-function describe(entry: Shown, scene: Scene | null) {
+function describe(entry: Shown, store: Store) {
   const [word, urgent] = KINDS.get(entry.kind) ?? [oneLine(entry.kind).replaceAll('_', ' '), true];
   entry.urgent = urgent;
   entry.chip.className = `alarm ${urgent ? 'urgent' : 'minor'}${entry.ended ? ' ended' : ''}`
@@ -132,8 +130,7 @@ function describe(entry: Shown, scene: Scene | null) {
     + (entry.known ? '' : ': click to acknowledge');
   setText(entry.says, word);
   // The text names the vehicle, but not the recorder.
-  const isVehicle = scene?.vehicles.some((vehicle) => vehicle.id === entry.subject);
-  setText(entry.whom, isVehicle ? entry.subject : '');
+  setText(entry.whom, store.vehicle(entry.subject)?.id ?? '');
 }
 
 /** Hide words, those of minor and ended alarms first, until all alarms fit. */

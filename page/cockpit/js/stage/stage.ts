@@ -209,8 +209,7 @@ export class Stage {
   }
 
   get #isAutonomous() {
-    return this.#store.scene?.vehicles.find(
-      ({ id }) => id === this.address.seat)?.role === 'autonomous';
+    return this.#store.vehicle(this.address.seat)?.role === 'autonomous';
   }
 
   /** Return whether it still has the AV that it took over in the run before this one. */
@@ -234,7 +233,7 @@ export class Stage {
     }
     if (!this.#seated) {
       const other = seats[seat]?.holder ?? null;
-      const absent = scene !== null && !scene.vehicles.some(({ id }) => id === seat);
+      const absent = scene !== null && this.#store.vehicle(seat) === undefined;
       return absent ? 'no_seat' : other !== null && other !== me.id ? 'taken'
         : this.#failed !== '' ? 'failed' : 'connecting';
     }

@@ -99,9 +99,8 @@ export class View3d {
   get vehicle() {
     const { driving, world } = window.crgame;
     const wanted = [this.window?.vehicle, this.#clock.vehicle, driving?.seat, world?.followed];
-    const vehicles = this.#store.scene?.vehicles ?? [];
-    return wanted.find((id) => vehicles.some((vehicle) => vehicle.id === id))
-      ?? vehicles[0]?.id ?? null;
+    return wanted.find((id) => this.#store.vehicle(id) !== undefined)
+      ?? this.#store.scene?.vehicles[0]?.id ?? null;
   }
 
   /** Show the 3D view or the map; return whether it is shown: it needs three.js and WebGL 2. */
