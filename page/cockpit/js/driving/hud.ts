@@ -198,25 +198,16 @@ function buildParts(keyboard: Keyboard) {
     element('div', { class: 'hud-title' }, parts.who, parts.device, parts.seen),
     element('div', { class: 'hud-row' },
       element('div', { class: 'hud-pedals' }, parts.brake.node, parts.throttle.node),
-      speedBlock(parts),
+      element('div', { class: 'hud-speed' }, parts.lights.node,
+        element('div', { class: 'hud-main' }, parts.kmh,
+          element('span', { class: 'hud-unit', text: 'km/h' })),
+        element('div', { class: 'hud-small' }, parts.ms, parts.acceleration)),
       element('div', { class: 'hud-signs' }, parts.gear, parts.limit),
-      element('div', { class: 'hud-steering' }, parts.wheel.node, turnBlock(parts)),
+      element('div', { class: 'hud-steering' }, parts.wheel.node,
+        element('div', { class: 'hud-turn' }, element('div', { class: 'hud-angles' },
+          label('Wheels', parts.angle), label('Steering', parts.command)), parts.steering.node)),
       parts.keycaps.node));
   return { ...parts, board };
-}
-
-function speedBlock({ kmh, ms, acceleration, lights }: Record<'kmh' | 'ms' | 'acceleration',
-  HTMLElement> & { lights: ReturnType<typeof lightSigns> }) {
-  return element('div', { class: 'hud-speed' }, lights.node,
-    element('div', { class: 'hud-main' }, kmh,
-      element('span', { class: 'hud-unit', text: 'km/h' })),
-    element('div', { class: 'hud-small' }, ms, acceleration));
-}
-
-function turnBlock({ angle, command, steering }: { angle: HTMLElement; command: HTMLElement;
-  steering: ReturnType<typeof steeringBar> }) {
-  return element('div', { class: 'hud-turn' }, element('div', { class: 'hud-angles' },
-    label('Wheels', angle), label('Steering', command)), steering.node);
 }
 
 function label(text: string, value: HTMLElement) {
