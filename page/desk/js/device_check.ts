@@ -48,7 +48,8 @@ export class DeviceCheck {
     finish: (told: { device: string; moved: string[] }) => void) {
     this.#words = words;
     this.#finish = finish;
-    this.#calibrate = button(words.of('device_calibrate'), '', () => this.#openCalibration());
+    this.#calibrate = button(words.of('device_calibrate'), '',
+      () => this.#calibration.open(Number(this.#chosen)));
     setText(this.#none, words.of('device_none'));
     this.node = element('div', { class: 'device-check' },
       element('h2', { text: words.of('device') }),
@@ -104,14 +105,10 @@ export class DeviceCheck {
       if (touched && !this.#told && this.#chosen === KEYBOARD
           && this.#moved.size < MOVEMENTS.length) {
         this.#choose(`${pad.index}`);
-        this.#markChosen();
+        for (const input of this.#devices.querySelectorAll('input')) {
+          input.checked = input.value === this.#chosen;
+        }
       }
-    }
-  }
-
-  #markChosen() {
-    for (const input of this.#devices.querySelectorAll('input')) {
-      input.checked = input.value === this.#chosen;
     }
   }
 
@@ -178,10 +175,6 @@ export class DeviceCheck {
     if (complete) {
       setText(this.#problem, '');
     }
-  }
-
-  #openCalibration() {
-    this.#calibration.open(Number(this.#chosen));
   }
 
   #keep(index: number, profile: Profile | null) {
