@@ -36,7 +36,7 @@ export type Draw = (node: HTMLElement, ...what: object[]) => Promise<unknown>;
   const plots: Record<string, Plot> = JSON.parse(
     document.getElementById('plots')?.textContent ?? '{}');
   const decoded = new Map<string, { x: Float32Array; y: Float64Array }[]>();
-  const drawn = new Map<PlotNode, { paper: boolean }>();
+  const drawn = new Set<PlotNode>();
   /** The chosen time of each run [s]. */
   const chosen = new Map<string, number>();
   const nodes = [...document.querySelectorAll<PlotNode>('.plot')];
@@ -148,7 +148,7 @@ export type Draw = (node: HTMLElement, ...what: object[]) => Promise<unknown>;
 
   function draw(node: PlotNode) {
     const first = !drawn.has(node);
-    drawn.set(node, { paper: printing });
+    drawn.add(node);
     Plotly.react(node, traces(node), layout(node, printing),
       { ...CONFIG, staticPlot: printing });
     if (first) {
@@ -165,7 +165,7 @@ export type Draw = (node: HTMLElement, ...what: object[]) => Promise<unknown>;
     if (printing || plots[node.id].plane || (!whole && from === undefined)) {
       return;
     }
-    for (const other of drawn.keys()) {
+    for (const other of drawn) {
       const axis = other.layout?.xaxis;
       // Each tells of its own change, too, some time later: then there is nothing left to do.
       const same = whole ? axis?.autorange : axis?.range?.[0] === from && axis?.range?.[1] === to;
@@ -179,7 +179,7 @@ export type Draw = (node: HTMLElement, ...what: object[]) => Promise<unknown>;
   /** Mark a time in all plots of its run; `time` [s]. */
   function choose(run: string, time: number) {
     chosen.set(run, time);
-    for (const node of drawn.keys()) {
+    for (const node of drawn) {
       if (runOf(node) === run && !plots[node.id].plane) {
         Plotly.relayout(node, { shapes: shapes(node) });
       }
@@ -224,7 +224,7 @@ export type Draw = (node: HTMLElement, ...what: object[]) => Promise<unknown>;
   });
 
   function redraw() {
-    for (const node of drawn.keys()) {
+    for (const node of drawn) {
       draw(node);
     }
   }
