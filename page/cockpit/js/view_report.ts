@@ -41,7 +41,7 @@ export class ViewReport {
         || (text === this.#sent && since_ms < SEND_EVERY_MS)) {
       return;
     }
-    const pictures = this.#count;
+    const pictures = countPictures();
     // The picture rate of a view that was just opened is not known yet.
     const rate_hz = text === this.#sent ? 1000 * (pictures - this.#pictures) / since_ms : null;
     if (this.#connection.send({ ...this.#choice, ratio: this.#ratio, rate_hz })) {
@@ -88,9 +88,10 @@ export class ViewReport {
     return view3d?.on && view3d.picture !== null ? view3d.picture.stats.ratio
       : window.devicePixelRatio;
   }
+}
 
-  get #count() {
-    const { view3d, world } = window.crgame;
-    return view3d?.on ? view3d.stats?.frames ?? 0 : world.stats.frames;
-  }
+/** Return how many pictures the shown view has drawn. */
+export function countPictures(): number {
+  const { view3d, world } = window.crgame;
+  return view3d?.on ? view3d.stats?.frames ?? 0 : world.stats.frames;
 }

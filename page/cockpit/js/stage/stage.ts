@@ -5,6 +5,7 @@
 import { element, setAttribute, setText } from '../dom.js';
 import { languageOf, WORDS } from '../driver_words.js';
 import { keepProfiles } from '../driving/gamepad_profile.js';
+import { countPictures } from '../view_report.js';
 import { readStage } from './stage_address.js';
 
 import type { Connection } from '../connection.js';
@@ -54,7 +55,7 @@ export class Stage {
       this.#role = '';
       this.#claimRole();
     });
-    store.on('epoch', () => { this.#before = this.#begun ? this.#pictures : NaN; });
+    store.on('epoch', () => { this.#before = this.#begun ? countPictures() : NaN; });
     store.on('scene', () => this.#speak());
     store.on(['seats', 'connection'], () => this.#update());
     this.#claimRole();
@@ -80,19 +81,13 @@ export class Stage {
     }
     // Until now, the page showed nothing: neither the map nor what the address hides.
     document.documentElement.dataset.begun = '';
-    this.#before = this.#pictures;
+    this.#before = countPictures();
     world.redraw();
     this.#update();
   }
 
   get #begun() {
     return !Number.isNaN(this.#before);
-  }
-
-  /** @returns number of pictures that the view has drawn */
-  get #pictures(): number {
-    const { view3d, world } = window.crgame;
-    return view3d?.on ? view3d.stats?.frames ?? 0 : world.stats.frames;
   }
 
   /** Use the language of the address, or else of the game, once it is known. */
@@ -259,7 +254,7 @@ export class Stage {
       reason: status?.run === 'ended' ? status.reason ?? '' : '', epoch, time_s,
       ready: this.#seated && Boolean(seats[seat]?.ready),
       countdown_s: connected ? status?.countdown_s ?? 0 : 0,
-      view: this.#view, drawn: this.#begun && this.#pictures > this.#before,
+      view: this.#view, drawn: this.#begun && countPictures() > this.#before,
       missing3d: this.#missing3d, sound: this.#sound,
       hasInput: this.#seated && driving?.away === null, away: driving?.away ?? '',
       device: driving?.device ?? '',
