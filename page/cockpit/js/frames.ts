@@ -55,7 +55,20 @@ export interface SeenFrame extends Head {
 }
 
 export interface ScanFrame extends Head, Scan { kind: typeof KIND.SCAN }
-export interface EstimateFrame extends Head, Estimate { kind: typeof KIND.ESTIMATE }
+
+export interface EstimateFrame extends Head {
+  kind: typeof KIND.ESTIMATE;
+  index: number;
+  x: number; // of the rear axle [m]
+  y: number; // [m]
+  yaw: number; // [rad]
+  speed: number; // [m/s]
+  yaw_rate: number; // [rad/s]
+  xx: number; // covariance [m^2]
+  xy: number;
+  yy: number;
+}
+
 export interface OccupancyFrame extends Head, Occupancy { kind: typeof KIND.OCCUPANCY }
 
 export interface CriticalityFrame extends Head {
@@ -81,18 +94,6 @@ export interface Scan {
   ranges: Float64Array; // [m]
 }
 
-export interface Estimate {
-  index: number;
-  x: number; // of the rear axle [m]
-  y: number; // [m]
-  yaw: number; // [rad]
-  speed: number; // [m/s]
-  yaw_rate: number; // [rad/s]
-  xx: number; // covariance [m^2]
-  xy: number;
-  yy: number;
-}
-
 export interface Occupancy {
   x: number; // of the lower left corner [m]
   y: number; // [m]
@@ -102,7 +103,7 @@ export interface Occupancy {
   bits: Uint8Array; // one for each cell, row by row
 }
 
-export type ReadRows = (from: number, count: number, width: number) => Float64Array;
+type ReadRows = (from: number, count: number, width: number) => Float64Array;
 
 /**
  * Read one frame without copying its values.

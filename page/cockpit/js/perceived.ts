@@ -22,16 +22,8 @@ const SCAN_LASTS_S = 0.3;
 // Frames may be ahead of the shown time by the delay of the display [s].
 const AHEAD_S = 0.5;
 
-/** Rear axle [m, rad] and covariance [m^2], n of the estimate. */
-export interface ShownEstimate {
-  n: number;
-  x: number;
-  y: number;
-  yaw: number;
-  xx: number;
-  xy: number;
-  yy: number;
-}
+/** Of the rear axle; `n` of the estimate. */
+export type ShownEstimate = Pick<EstimateFrame, 'n' | 'x' | 'y' | 'yaw' | 'xx' | 'xy' | 'yy'>;
 
 /** Frames of perception by AV, and the newest map. */
 export class Perceived {
