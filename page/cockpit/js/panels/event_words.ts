@@ -5,9 +5,7 @@
 import { KMH } from '../units.js';
 import { fixed, NONE } from './format.js';
 
-import type {
-  EventAction, EventCondition, GameEvent, ObstacleAction, TrafficAction,
-} from '../messages.js';
+import type { EventAction, EventCondition, GameEvent, TrafficAction } from '../messages.js';
 
 const THINGS: Record<string, string> = {
   constructionZone: 'a construction zone', parkedVehicle: 'a parked vehicle',
@@ -23,7 +21,8 @@ const ACTIONS: {
   brake: ['Brake', (event) => `Obstacle ${event.object} brakes at ${fixed(event.deceleration, 1)} `
     + `m/s² to ${event.speed > 0 ? speed(event.speed) : 'a stop'}`],
   obstacle: ['Obstacle', (event) => `Puts ${THINGS[event.type] ?? THINGS.unknown} of `
-    + `${fixed(event.length, 1)} × ${fixed(event.width, 1)} m ${place(event)}`],
+    + `${fixed(event.length, 1)} × ${fixed(event.width, 1)} m at `
+    + `(${fixed(event.x, 0)}, ${fixed(event.y, 0)})`],
   speed_limit: ['Speed limit', (event) => 'Sets the speed limit of '
     + `${lanelets(event.lanelets)} to ${speed(event.speed)}`],
   traffic: ['Traffic', (event) => `${event.agent === 'all' ? 'All agents of traffic'
@@ -105,10 +104,6 @@ function driving(event: TrafficAction) {
   add('red_runner', (value) => (value ? 'ignores lights' : 'obeys lights'));
   add('late_yielder', (value) => (value ? 'yields late' : 'yields in time'));
   return said.join(', ');
-}
-
-function place(event: ObstacleAction) {
-  return `at (${fixed(event.x, 0)}, ${fixed(event.y, 0)})`;
 }
 
 function lanelets(ids: number[] | undefined) {

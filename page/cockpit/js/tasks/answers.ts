@@ -97,10 +97,6 @@ export class Answers {
     }
   }
 
-  get #any() {
-    return this.#wanted('light') || this.#wanted('request');
-  }
-
   #key(event: KeyboardEvent) {
     const inputs = this.#inputs();
     const what = (['light', 'request'] as const).find((each) => inputs[each]?.key === event.code
@@ -115,7 +111,7 @@ export class Answers {
   }
 
   #poll() {
-    this.#polling = this.#any;
+    this.#polling = this.#wanted('light') || this.#wanted('request');
     const now_ms = performance.now();
     const inputs = this.#inputs();
     for (const pad of connectedPads()) {
