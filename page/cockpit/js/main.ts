@@ -3,6 +3,7 @@
 /** Entry point of the page: one store, one connection, the world, and the parts around it. */
 
 import { Connection } from './connection.js';
+import { errorText } from './panels/format.js';
 import { addPanels } from './panels/tabs.js';
 import { PARTS, STAGE } from './parts.js';
 import { readStage } from './stage/stage_address.js';
@@ -36,8 +37,7 @@ for (const [i, [path, make, root, name]] of parts.entries()) {
     window.crgame[name] = new module[make](document.querySelector(root), store, connection);
   } catch (error) {
     console.error(`${path}: ${error}`);
-    const text = `${path} failed: ${error instanceof Error ? error.message : error}`;
-    store.receive({ type: 'notice', level: 'error', text });
+    store.receive({ type: 'notice', level: 'error', text: `${path} failed: ${errorText(error)}` });
   }
 }
 await window.crgame.stage?.begin();

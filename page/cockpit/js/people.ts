@@ -3,7 +3,7 @@
 /** The people at this cockpit: roles, delays, and links that admit others. */
 
 import { element, setAttribute, setText } from './dom.js';
-import { oneLine } from './panels/format.js';
+import { errorText, oneLine } from './panels/format.js';
 import { session } from './panels/memory.js';
 import { post } from './panels/scenario_api.js';
 import { tellRefusal } from './rights.js';
@@ -117,7 +117,7 @@ export class People {
     try {
       ({ link } = await post<{ link: string }>('/api/invite', { role, seat }));
     } catch (error) {
-      refusal = (error as Error).message;
+      refusal = errorText(error);
     }
     setText(this.#error, refusal);
     setAttribute(this.#link, 'hidden', link === '');

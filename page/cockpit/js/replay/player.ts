@@ -3,6 +3,7 @@
 /** The player of a recording: the shown time, its motion, and the run that it belongs to. */
 
 import { inEveryFrame } from '../dom.js';
+import { errorText } from '../panels/format.js';
 import { ask } from './chunks.js';
 import { ReplayDocuments } from './documents.js';
 import { ReplayFeed } from './replay_feed.js';
@@ -252,7 +253,7 @@ export class Player {
 
   /** Show an error once. */
   #refuse(error: unknown) {
-    const text = error instanceof Error ? error.message : String(error);
+    const text = errorText(error);
     if (this.#told !== text) {
       this.#told = text;
       this.#store.receive({ type: 'notice', level: 'error', text });

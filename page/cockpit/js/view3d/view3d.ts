@@ -4,6 +4,7 @@
 
 import { element } from '../dom.js';
 import { isCommand, isTyping } from '../driving/focus.js';
+import { errorText } from '../panels/format.js';
 import { VIEWPOINTS } from './cameras.js';
 import { acrossAngle, heightAngle } from './field_of_view.js';
 import { KeyAnswer } from './key_answer.js';
@@ -166,8 +167,7 @@ export class View3d {
       this.picture ??= new module.Picture(three, this.#canvas, this.#store);
       return true;
     } catch (error) {
-      const reason = error instanceof Error ? error.message : error;
-      this.#notify(`The 3D view cannot be drawn: ${reason}`);
+      this.#notify(`The 3D view cannot be drawn: ${errorText(error)}`);
       return false;
     }
   }
