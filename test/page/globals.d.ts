@@ -8,7 +8,7 @@ import type { Person } from '../../page/cockpit/js/person.js';
 import type { InstantReplay } from '../../page/cockpit/js/after/instant_replay.js';
 import type { createScenario } from '../../page/cockpit/js/panels/scenario.js';
 import type { Plotly } from '../../page/cockpit/js/panels/plotly.js';
-import type { createPerception } from '../../page/cockpit/js/perception/perception.js';
+import type { Perception } from '../../page/cockpit/js/perception/perception.js';
 import type { Sound } from '../../page/cockpit/js/sound/sound.js';
 import type { Stage } from '../../page/cockpit/js/stage/stage.js';
 import type { Store } from '../../page/cockpit/js/store.js';
@@ -23,7 +23,7 @@ interface Crgame {
   world: World;
   driving?: Driving;
   person?: Person;
-  perception?: ReturnType<typeof createPerception>;
+  perception?: Perception;
   sound?: Sound;
   tasks?: Tasks;
   view3d?: View3d;

@@ -43,7 +43,7 @@ export const PARTS = [
   ['./panels/outcome.js', 'Outcome', '#outcome', 'outcome'],
   ['./panels/history.js', 'createHistory', '#panel-history', 'history'],
   ['./panels/criticality_panel.js', 'createCriticality', '#panel-criticality', 'criticality'],
-  ['./perception/perception.js', 'createPerception', '#stage', 'perception'],
+  ['./perception/perception.js', 'Perception', '#stage', 'perception'],
   ['./view3d/view3d.js', 'View3d', '#stage', 'view3d'],
   ['./view_report.js', 'ViewReport', '#stage', 'viewReport'],
   ['./world/around.js', 'createAround', '#around', 'around'],

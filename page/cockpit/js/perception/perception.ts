@@ -45,10 +45,10 @@ const COUNT_EVERY_MS = 200;
 const NAMES = Object.keys(LAYERS) as LayerName[];
 
 /** The layers of perception of one world. */
-class Perception {
+export class Perception {
   #store;
   #connection;
-  #world;
+  #world: World = window.crgame.world;
   #unseen: Unseen | null = null;
   #flags: Uint8Array | null = null;
   #on: Partial<Record<LayerName, boolean>> = {};
@@ -61,12 +61,12 @@ class Perception {
   #sentLayers = '';
   #legended = '';
 
-  constructor(stage: HTMLElement, store: Store, connection: Connection, world: World) {
+  /** @param stage that holds the canvas */
+  constructor(stage: HTMLElement, store: Store, connection: Connection) {
     this.#store = store;
     this.#connection = connection;
-    this.#world = world;
     this.#legend = createLegend(stage);
-    this.#addLayers(world);
+    this.#addLayers();
     this.#group = element('div', { class: 'world-group' });
     stage.querySelector('.world-toolbar')?.append(this.#group);
     this.#addButtons();
@@ -135,7 +135,8 @@ class Perception {
     this.#world.redraw();
   }
 
-  #addLayers(world: World) {
+  #addLayers() {
+    const world = this.#world;
     world.drawHollow((view) => this.#choose(view));
     const add = (name: LayerName, draw: DrawLayer, where: Place) => (
       world.addLayer(PREFIX + name, (context, view) => {
@@ -226,12 +227,6 @@ class Perception {
       setAttribute(line, 'hidden', count === null);
     }
   }
-}
-
-/** Put the layers of perception on the world; `stage` that holds the canvas. */
-export function createPerception(stage: HTMLElement, store: Store,
-  connection: Connection): Perception {
-  return new Perception(stage, store, connection, window.crgame.world);
 }
 
 // Replaces the first entry of the legend while the planner's knowledge is unknown.
