@@ -5,6 +5,7 @@
 import { element, part, setAttribute, setText, svg } from './dom.js';
 import { isCommand } from './driving/focus.js';
 import { confirm } from './panels/confirm.js';
+import { clockTime, NONE } from './panels/format.js';
 import { reasonAgainst, reasonAgainstOrder, tellRefusal } from './rights.js';
 
 import type { Connection } from './connection.js';
@@ -142,7 +143,7 @@ export class RunControl {
 }
 
 function buildClock(node: HTMLElement) {
-  const time = element('span', { class: 'clock-time', text: '–' });
+  const time = element('span', { class: 'clock-time', text: NONE });
   const step = element('span', { class: 'clock-step' });
   const factor = element('span', { class: 'clock-factor', title: 'Measured real-time factor' });
   const state = element('span', { class: 'clock-state', role: 'status' });
@@ -150,8 +151,8 @@ function buildClock(node: HTMLElement) {
   return {
     node,
     show({ t, k, measured_factor, run }: Status, connected: boolean) {
-      setText(time, Number.isFinite(t) ? `${t.toFixed(1)} s` : '–');
-      setText(step, `k ${k ?? '–'}`);
+      setText(time, clockTime(t));
+      setText(step, `k ${k ?? NONE}`);
       setText(factor, run === 'running' && Number.isFinite(measured_factor)
         ? `× ${Number(measured_factor).toFixed(2)}` : '');
       const told = connected || run === 'ended';
