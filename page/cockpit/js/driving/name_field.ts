@@ -3,12 +3,11 @@
 /** The field with the name that others see; kept in this browser. */
 
 import { element } from '../dom.js';
-import { local } from '../panels/memory.js';
+import { recall, remember } from '../panels/memory.js';
 
 import type { Connection } from '../connection.js';
 import type { Store } from '../store.js';
 
-const KEY = 'crgame.name';
 const LONGEST = 40;
 
 export function nameField(store: Store, connection: Connection): HTMLElement {
@@ -18,12 +17,12 @@ export function nameField(store: Store, connection: Connection): HTMLElement {
     if (store.me.id === '') {
       return;
     }
-    const kept = local.get(KEY);
+    const kept = recall('name');
     if (kept) {
       connection.send({ type: 'name', name: kept });
     }
     if (document.activeElement !== input) {
-      input.value = kept ?? store.me.name;
+      input.value = kept || store.me.name;
     }
   };
   input.addEventListener('change', () => {
@@ -33,7 +32,7 @@ export function nameField(store: Store, connection: Connection): HTMLElement {
       return;
     }
     store.me.name = name;
-    local.set(KEY, name);
+    remember('name', name);
     connection.send({ type: 'name', name });
   });
   input.addEventListener('focus', () => input.select());
