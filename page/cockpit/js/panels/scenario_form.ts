@@ -42,7 +42,7 @@ export class ScenarioForm {
         row.title = `planning problem ${problem}`;
       }
       const select = this.#rows.get(id)?.select as HTMLSelectElement;
-      const more = new PlannerOptions(select, options ?? {}, fetchPlannerOptions);
+      const more = new PlannerOptions(select, options ?? {});
       this.#options.set(id, more);
       row.append(more.root);
       nodes.push(row);
@@ -104,7 +104,6 @@ class PlannerOptions {
   #select;
   #own;
   #present;
-  #ask;
   #fields = element('div', { class: 'stack' });
   #hint = element('p', { class: 'hint' });
   /** Of the chosen planner; null until they are known. */
@@ -116,14 +115,11 @@ class PlannerOptions {
   /**
    * @param select the choice of the planner
    * @param own the game's options for its own planner, as typed
-   * @param ask for the options of a planner
    */
-  constructor(select: HTMLSelectElement, own: Record<string, string>,
-    ask: (planner: string) => Promise<PlannerOption[]>) {
+  constructor(select: HTMLSelectElement, own: Record<string, string>) {
     this.#select = select;
     this.#own = own;
     this.#present = select.value;
-    this.#ask = ask;
     this.root = element('details', { class: 'planner-options' },
       element('summary', { text: 'Options' }), this.#hint, this.#fields);
     this.root.addEventListener('toggle', () => this.#open());
@@ -151,7 +147,7 @@ class PlannerOptions {
     this.#asked = planner;
     setText(this.#hint, 'Asking the planner …');
     try {
-      const options = await this.#ask(planner);
+      const options = await fetchPlannerOptions(planner);
       if (this.#asked === planner) {
         setText(this.#hint, options.length ? '' : 'It has none.');
         this.#show(options, planner === this.#present ? this.#own : {});

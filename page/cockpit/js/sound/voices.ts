@@ -41,11 +41,10 @@ export class Value {
   }
 }
 
-/** Make a gain that begins at an amplitude and moves smoothly. */
-export function makeGain(context: BaseAudioContext,
-  amplitude = 0): { node: GainNode; gain: Value } {
+/** Make a gain that begins in silence and moves smoothly. */
+export function makeGain(context: BaseAudioContext): { node: GainNode; gain: Value } {
   const node = context.createGain();
-  return { node, gain: new Value(node.gain, amplitude) };
+  return { node, gain: new Value(node.gain, 0) };
 }
 
 /** @param frequency [Hz] */

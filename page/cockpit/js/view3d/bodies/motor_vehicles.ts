@@ -137,7 +137,7 @@ export function truck({ front, rear }: Axles = { front: 3.65, rear: -3.1 }): Bod
     lamps: { front: [l + 0.01, 0.8 * w, 0.62], rear: [-l, 0.8 * w, 0.8], size: [0.34, 0.16] } };
 }
 
-export function bus({ front, rear }: Axles = { front: 3.3, rear: -2.7 }): Body {
+export function bus(): Body {
   const [length, width, height] = [12, 2.55, 3.1];
   const l = length / 2;
   const w = width / 2;
@@ -151,7 +151,7 @@ export function bus({ front, rear }: Axles = { front: 3.3, rear: -2.7 }): Body {
     mesh.box([x - 0.05, -w - 0.005, 1.14], [x + 0.05, w + 0.005, 2.66], TRIM, { y: 0.02 });
   }
   mirrors(mesh, l + 0.1, w, 2.1, 0.35);
-  const wheels = { front, rear, track: width + 0.02, radius: 0.48, width: 0.3 };
+  const wheels = { front: 3.3, rear: -2.7, track: width + 0.02, radius: 0.48, width: 0.3 };
   arches(mesh, wheels, w);
   return { mesh, length, width, height, wheels,
     lamps: { front: [l, 0.78 * w, 0.7], rear: [-l, 0.84 * w, 1.0], size: [0.28, 0.2] } };
