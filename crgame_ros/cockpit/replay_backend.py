@@ -3,9 +3,9 @@
 """A recording behind the page: its description, and its frames in chunks."""
 
 import asyncio
-from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 import json
 from pathlib import Path
 from typing import Literal, TYPE_CHECKING, TypeVar
@@ -92,36 +92,18 @@ class Replay:
     :param reader: the recording.
     :param epoch: epoch of the run.
     :param progress: called with the share of the recording that has been read, 0 to 1.
+    :ivar chunk: `ChunkBuilder.build`, from memory for the chunks that were requested last.
     :raises InputError: if the recording lacks the description of the run or its states.
     """
 
-    def __init__(self, reader: BagReader, epoch: int, progress: Progress | None = None) -> None:
+    def __init__(self, reader: BagReader, epoch: int, progress: Progress | None) -> None:
         self._reader = reader
         self.index: RunIndex = index_run(reader, read_epoch(reader, epoch), progress)
         self.builder = ChunkBuilder(reader, self.index)
+        self.chunk = lru_cache(CHUNKS_KEPT)(self.builder.build)
         run = self.index.run
         loaded = parse_scenario(run.xml_text, f'{reader.path}, /scenario/xml')
         self.scene = scene_document(loaded, run.descriptions, run.game)
-        self._chunks: OrderedDict[int, bytes] = OrderedDict()
-
-    @property
-    def chunks_held(self) -> int:
-        """Return the number of chunks in memory, at most `CHUNKS_KEPT`."""
-        return len(self._chunks)
-
-    def chunk(self, number: int) -> bytes:
-        """
-        Return a chunk, from memory if it was requested recently.
-
-        :raises InputError: if there is no such chunk, or the recording is damaged in it.
-        """
-        if number not in self._chunks:
-            data = self.builder.build(number)
-            while len(self._chunks) >= CHUNKS_KEPT:
-                self._chunks.popitem(last=False)
-            self._chunks[number] = data
-        self._chunks.move_to_end(number)
-        return self._chunks[number]
 
     def criticality(self) -> tuple[Epoch, bytes | None]:
         """Return the run and its recorded CRITICALITY frames; None if none were recorded."""
@@ -168,15 +150,14 @@ class ReplayBackend:
     def __init__(self, path: Path, epoch: int | None = None,
                  progress: Progress | None = None) -> None:
         self.path = recording_in(path)
-        self._progress = progress
         # SQLite and the chunks in memory are used in one thread only.
         self._thread = ThreadPoolExecutor(1, 'replay')
-        self._runs: OrderedDict[int, Replay] = OrderedDict()
         self._measuring = asyncio.Lock()
         self._measured: dict[int, bytes] = {}
         try:
             self._reader, self.epochs = self._thread.submit(self._open).result()
             self.epoch = self.epochs[-1] if epoch is None else epoch
+            self._run = lru_cache(RUNS_KEPT)(lambda epoch: Replay(self._reader, epoch, progress))
             self._thread.submit(self._run, self.epoch).result()
         except BaseException:
             self._thread.shutdown()
@@ -196,15 +177,6 @@ class ReplayBackend:
         reader = BagReader(self.path, parts=True)
         return reader, epoch_numbers(reader)
 
-    def _run(self, epoch: int) -> Replay:
-        if epoch not in self._runs:
-            replay = Replay(self._reader, epoch, self._progress)
-            while len(self._runs) >= RUNS_KEPT:
-                self._runs.popitem(last=False)
-            self._runs[epoch] = replay
-        self._runs.move_to_end(epoch)
-        return self._runs[epoch]
-
     def info(self, epoch: int | None = None) -> dict[str, object]:
         """
         Return the description of a run; wait until it has been read.
@@ -212,7 +184,7 @@ class ReplayBackend:
         :param epoch: epoch of the run, None for the one that is shown first.
         :raises InputError: if it is not in the recording or cannot be read.
         """
-        return self._thread.submit(self._info, epoch).result()
+        return self._thread.submit(self._info, self._chosen(epoch)).result()
 
     def chunk(self, number: int, epoch: int | None = None) -> bytes:
         """
@@ -221,21 +193,24 @@ class ReplayBackend:
         :param number: number of the chunk, from 0.
         :raises InputError: if there is no such chunk or epoch, or the recording is damaged there.
         """
-        return self._thread.submit(self._chunk, number, epoch).result()
-
-    def _info(self, epoch: int | None) -> dict[str, object]:
-        replay = self._run(self.epoch if epoch is None else epoch)
-        return {**replay.info(), 'epochs': list(self.epochs), 'recording': self.path.name}
-
-    def _chunk(self, number: int, epoch: int | None) -> bytes:
-        return self._run(self.epoch if epoch is None else epoch).chunk(number)
+        return self._thread.submit(self._chunk, self._chosen(epoch), number).result()
 
     def outline(self, epoch: int | None = None) -> bytes:
         """Return thinned-out STATE frames of the whole run, each after its length in bytes."""
-        return self._thread.submit(self._outline, epoch).result()
+        return self._thread.submit(self._outline, self._chosen(epoch)).result()
 
-    def _outline(self, epoch: int | None) -> bytes:
-        return self._run(self.epoch if epoch is None else epoch).index.outline.encoded()
+    def _chosen(self, epoch: int | None) -> int:
+        return self.epoch if epoch is None else epoch
+
+    def _info(self, epoch: int) -> dict[str, object]:
+        return {**self._run(epoch).info(), 'epochs': list(self.epochs),
+                'recording': self.path.name}
+
+    def _chunk(self, epoch: int, number: int) -> bytes:
+        return self._run(epoch).chunk(number)
+
+    def _outline(self, epoch: int) -> bytes:
+        return self._run(epoch).index.outline.encoded()
 
     def _criticality(self, epoch: int) -> tuple[Epoch, bytes | None]:
         return self._run(epoch).criticality()
@@ -260,7 +235,7 @@ class ReplayBackend:
         number = _whole_number(request.query.get('i'))
         if number is None:
             raise _missing('there is no such chunk')
-        return web.Response(body=await self._read(self._chunk, number, epoch),
+        return web.Response(body=await self._read(self._chunk, epoch, number),
                             content_type='application/octet-stream')
 
     async def _answer_outline(self, request: web.Request) -> web.Response:

@@ -159,9 +159,9 @@ def test_chunks_are_built_when_asked_for(bag: Path, monkeypatch: pytest.MonkeyPa
     try:
         info = backend.info()
         assert (info['chunks'], info['chunk_s']) == (25, 0.5)
-        run = backend._runs[0]
+        run = backend._run(0)
         first = [backend.chunk(i) for i in range(25)]
-        assert run.chunks_held == CHUNKS_KEPT
+        assert run.chunk.cache_info().currsize == CHUNKS_KEPT
         read: list[int] = []
         content = McapFile._content
         monkeypatch.setattr(McapFile, '_content', lambda self, segment: read.append(
