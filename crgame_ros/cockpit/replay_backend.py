@@ -82,6 +82,8 @@ Progress = Callable[[float], None]
 # Each holds 5 s: enough for two people who view different parts.
 CHUNKS_KEPT = 8
 RUNS_KEPT = 2
+# Between two lines about the progress of reading [s].
+PATIENCE_S = 2.0
 _MOST_DIGITS = 9
 
 
@@ -314,23 +316,21 @@ def _missing(text: str) -> web.HTTPNotFound:
                             content_type='application/json')
 
 
-def open_replay(path: Path, epoch: int | None, say: Callable[[str], None],
-                clock_s: Callable[[], float], patience_s: float = 2.0) -> ReplayBackend:
+def open_replay(path: Path, say: Callable[[str], None],
+                clock_s: Callable[[], float]) -> ReplayBackend:
     """
     Open a recording, and print the progress if it takes long.
 
-    :param epoch: the run that is shown first, None for the last.
     :param say: prints a line.
     :param clock_s: steady clock [s].
-    :param patience_s: time between two lines [s].
     :raises InputError: like `ReplayBackend`.
     """
     told_s = clock_s()
 
     def show_progress(share: float) -> None:
         nonlocal told_s
-        if clock_s() - told_s > patience_s:
+        if clock_s() - told_s > PATIENCE_S:
             told_s = clock_s()
             say(f'reading {path}: {share:.0%}')
 
-    return ReplayBackend(path, epoch, show_progress)
+    return ReplayBackend(path, progress=show_progress)

@@ -27,7 +27,7 @@ def serve_replay(path: Path, host: str = '127.0.0.1', port: int = 8080, token: s
     :raises InputError: if the recording cannot be shown, or no port is free.
     """
     access = Access.guarded(host, port) if token is None else Access(host, port, token)
-    backend = open_replay(path, None, say, time.monotonic)
+    backend = open_replay(path, say, time.monotonic)
     asyncio.run(_serve(backend, access, say))
     return 0
 

@@ -353,11 +353,11 @@ def test_progress_is_told_when_it_takes_long(bag: Path) -> None:
     """With a clock of one second per read, every third read gives a line with the share done."""
     times = iter(range(1000))
     said: list[str] = []
-    backend = open_replay(bag, None, said.append, lambda: float(next(times)))
+    backend = open_replay(bag, said.append, lambda: float(next(times)))
     backend.close()
     assert said and all(line.startswith(f'reading {bag}: ') for line in said)
     quiet: list[str] = []
-    open_replay(bag, None, quiet.append, lambda: 0.0).close()
+    open_replay(bag, quiet.append, lambda: 0.0).close()
     assert quiet == []
 
 
