@@ -3,7 +3,7 @@
 """Conversion of a run's messages to frames of the page, alike for live runs and recordings."""
 
 from collections import OrderedDict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 import math
 from typing import Any, NamedTuple
 
@@ -122,85 +122,6 @@ MAX_CELLS = 2 ** 26
 _COVARIANCE = (0, 1, 7)
 
 
-class ScanFrame(NamedTuple):
-    """The frame of a scan with the AV's id and column and the index of the sensor."""
-
-    av: str
-    column: int
-    sensor: int
-    frame: bytes
-
-
-def _scan_frame(place: Place, message: Any, mounts: SensorMounts,
-                columns: Mapping[str, int]) -> ScanFrame | None:
-    """
-    Read a sensor_msgs/LaserScan of a sensor of the game.
-
-    :param place: place of its stamp.
-    :param mounts: mounts of the game, with past states of the vehicles.
-    :param columns: columns of the driven vehicles, by id.
-    :return: None if no AV has the sensor or its pose is unknown.
-    :raises InputError: if its numbers do not describe a fan.
-    """
-    found = mounts.sensor(message.header.frame_id)
-    if found is None:
-        return None
-    av, mount = found
-    pose = mounts.pose(av, mount, place.n)
-    if pose is None:
-        return None
-    ranges: NDArray[np.float64] = np.array(message.ranges, dtype=np.float64)
-    first, last = float(message.angle_min), float(message.angle_max)
-    longest, period_s = float(message.range_max), float(message.scan_time)
-    if not 0 < len(ranges) <= MAX_RAYS or longest <= 0.0 \
-            or not all(map(math.isfinite, (first, last, longest, period_s))):
-        raise InputError(f'has {len(ranges)} rays of {longest} m', f'/{av}/scan',
-                         f'give 1 to {MAX_RAYS} of finite length')
-    ranges[np.isnan(ranges)] = np.inf
-    increment = (last - first) / max(1, len(ranges) - 1)
-    return ScanFrame(av, columns[av], mount.number, frames.encode_scan(
-        place, columns[av], mount.number, (*pose, first, increment, longest, period_s),
-        np.maximum(ranges, 0.0)))
-
-
-def _estimate_frame(place: Place, column: int, message: Any) -> bytes:
-    """
-    Read a nav_msgs/Odometry with an AV's estimated pose.
-
-    :param place: place of its stamp.
-    :param column: column of the AV.
-    :raises InputError: if a number in it is not finite.
-    """
-    position, turn = message.pose.pose.position, message.pose.pose.orientation
-    yaw = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y),
-                     1.0 - 2.0 * (turn.y * turn.y + turn.z * turn.z))
-    covariance = message.pose.covariance
-    twist = message.twist.twist
-    row = np.array([position.x, position.y, yaw, twist.linear.x, twist.angular.z,
-                    *(covariance[index] for index in _COVARIANCE)])
-    if not np.isfinite(row).all():
-        raise InputError('holds numbers that are not finite', 'localization')
-    return frames.encode_estimate(place, column, row)
-
-
-def _occupancy_frame(place: Place, message: Any) -> bytes:
-    """
-    Read a nav_msgs/OccupancyGrid; a cell that is neither free nor occupied counts as free.
-
-    :param place: place from which it is valid.
-    :raises InputError: if its cells do not fit its size, or it is rotated.
-    """
-    info = message.info
-    cells = np.array(message.data, dtype=np.int8)
-    if len(cells) != info.height * info.width or not 0 < len(cells) <= MAX_CELLS:
-        raise InputError(f'has {len(cells)} cells for {info.height} x {info.width}', '/occupancy')
-    if abs(info.origin.orientation.z) > 1e-9:
-        raise InputError('is turned', '/occupancy', 'give a grid along the axes of map')
-    origin = (float(info.origin.position.x), float(info.origin.position.y))
-    return frames.encode_occupancy(place, origin, float(info.resolution),
-                                   cells.reshape(info.height, info.width) > 50)
-
-
 class Frame(NamedTuple):
     """A frame and its slot; a page needs only the newest frame of a slot."""
 
@@ -303,17 +224,46 @@ class MessageFrames:
         return Frame(f'prediction:{column}', frames.encode_prediction(
             place, column, columns, futures[present]))
 
-    def estimate(self, place: Place, av: str, message: object) -> Frame:
-        """Return the frame of an AV's pose estimate."""
+    def estimate(self, place: Place, av: str, message: Any) -> Frame:
+        """Return the frame of an AV's pose estimate, a nav_msgs/Odometry."""
+        position, turn = message.pose.pose.position, message.pose.pose.orientation
+        yaw = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y),
+                         1.0 - 2.0 * (turn.y * turn.y + turn.z * turn.z))
+        covariance = message.pose.covariance
+        twist = message.twist.twist
+        row = np.array([position.x, position.y, yaw, twist.linear.x, twist.angular.z,
+                        *(covariance[index] for index in _COVARIANCE)])
+        if not np.isfinite(row).all():
+            raise InputError('holds numbers that are not finite', 'localization')
         column = self.columns[av]
-        return Frame(f'estimate:{column}', _estimate_frame(place, column, message))
+        return Frame(f'estimate:{column}', frames.encode_estimate(place, column, row))
 
-    def scan(self, place: Place, av: str, message: object) -> Frame | None:
-        """Return the frame of a scan; None if the AV lacks the sensor or its pose is unknown."""
-        scan = _scan_frame(place, message, self.mounts, self.columns)
-        if scan is None or scan.av != av:
+    def scan(self, place: Place, av: str, message: Any) -> Frame | None:
+        """
+        Return the frame of a sensor_msgs/LaserScan.
+
+        :return: None if the AV lacks the sensor or its pose is unknown.
+        """
+        found = self.mounts.sensor(message.header.frame_id)
+        if found is None or found[0] != av:
             return None
-        return Frame(f'scan:{scan.column}:{scan.sensor}', scan.frame)
+        mount = found[1]
+        pose = self.mounts.pose(av, mount, place.n)
+        if pose is None:
+            return None
+        ranges: NDArray[np.float64] = np.array(message.ranges, dtype=np.float64)
+        first, last = float(message.angle_min), float(message.angle_max)
+        longest, period_s = float(message.range_max), float(message.scan_time)
+        if not 0 < len(ranges) <= MAX_RAYS or longest <= 0.0 \
+                or not all(map(math.isfinite, (first, last, longest, period_s))):
+            raise InputError(f'has {len(ranges)} rays of {longest} m', f'/{av}/scan',
+                             f'give 1 to {MAX_RAYS} of finite length')
+        ranges[np.isnan(ranges)] = np.inf
+        increment = (last - first) / max(1, len(ranges) - 1)
+        column = self.columns[av]
+        return Frame(f'scan:{column}:{mount.number}', frames.encode_scan(
+            place, column, mount.number, (*pose, first, increment, longest, period_s),
+            np.maximum(ranges, 0.0)))
 
     def criticality(self, message: Any) -> Frame | None:
         """Return the frame of `/criticality`; None if it is of another run."""
@@ -332,9 +282,25 @@ class MessageFrames:
         return Frame('criticality', frames.encode_criticality(
             self.place(int(rows[0, 1])), most_critical_rows(rows)))
 
-    def occupancy(self, place: Place, message: object) -> Frame:
-        """Return the frame of the map of permanent obstacles, valid from a place on."""
-        return Frame('occupancy', _occupancy_frame(place, message))
+    def occupancy(self, place: Place, message: Any) -> Frame:
+        """
+        Return the frame of the map of permanent obstacles, a nav_msgs/OccupancyGrid.
+
+        A cell that is neither free nor occupied counts as free.
+
+        :param place: place from which it is valid.
+        """
+        info = message.info
+        cells = np.array(message.data, dtype=np.int8)
+        if len(cells) != info.height * info.width or not 0 < len(cells) <= MAX_CELLS:
+            raise InputError(f'has {len(cells)} cells for {info.height} x {info.width}',
+                             '/occupancy')
+        if abs(info.origin.orientation.z) > 1e-9:
+            raise InputError('is turned', '/occupancy', 'give a grid along the axes of map')
+        origin = (float(info.origin.position.x), float(info.origin.position.y))
+        return Frame('occupancy', frames.encode_occupancy(
+            place, origin, float(info.resolution),
+            cells.reshape(info.height, info.width) > 50))
 
 
 def state_rows(states: FloatArray, commands: FloatArray | None) -> FloatArray:
