@@ -82,6 +82,10 @@ class ScenarioObstacles:
         them.
     :param put: obstacles that events may add later; absent until then.
     :ivar signals: of the recorded vehicles that have any, by column.
+    :ivar poses: (last_k - first_k + 1, M, 3) from `first_k` on; NaN where absent. Read-only, as
+        are the velocities.
+    :ivar velocities: with the shape of `poses`.
+    :ivar held: recorded courses of the obstacles that are held, by column.
     :raises InputError: if a shape cannot be used, or there are too many states.
     """
 
@@ -107,27 +111,17 @@ class ScenarioObstacles:
         if count * len(self.ids) > _MAX_CELLS:
             raise InputError(f'{len(self.ids)} obstacles over {count} time steps are too many',
                              loaded.source, 'shorten the trajectories')
-        self._poses: FloatArray = np.full((count, len(self.ids), 3), np.nan)
-        self._velocities: FloatArray = np.full((count, len(self.ids), 3), np.nan)
+        self.poses: FloatArray = np.full((count, len(self.ids), 3), np.nan)
+        self.velocities: FloatArray = np.full((count, len(self.ids), 3), np.nan)
         for column, track in enumerate(tracks):
             self._fill(column, track)
         # Columns of those that the run itself moves.
         self.living: NDArray[np.int_] = np.empty(0, dtype=int)
-        self._held = {column: self._hold(column) for column, part in enumerate(parts)
-                      if part.obstacle.obstacle_id in held}
-        self._poses.flags.writeable = False
-        self._velocities.flags.writeable = False
-        self._static = ObjectStates(*self._only_static())
-
-    @property
-    def poses(self) -> FloatArray:
-        """Return all (last_k - first_k + 1, M, 3) poses from `first_k` on; NaN where absent."""
-        return self._poses
-
-    @property
-    def velocities(self) -> FloatArray:
-        """Return all velocities, with the shape of `poses`."""
-        return self._velocities
+        self.held = {column: self._hold(column) for column, part in enumerate(parts)
+                     if part.obstacle.obstacle_id in held}
+        self.poses.flags.writeable = False
+        self.velocities.flags.writeable = False
+        self._static = self._only_static()
 
     def states_at(self, k: int) -> ObjectStates:
         """
@@ -140,7 +134,7 @@ class ScenarioObstacles:
         """
         if self.first_k <= k <= self.last_k:
             row = k - self.first_k
-            return ObjectStates(self._poses[row], self._velocities[row])
+            return ObjectStates(self.poses[row], self.velocities[row])
         return self._static
 
     def lights_at(self, k: int, states: ObjectStates | None = None,
@@ -157,7 +151,7 @@ class ScenarioObstacles:
         lights: dict[str, int] = {}
         for column, signals in self.signals.items():
             passed = k - released[column] if column in released else \
-                0 if column in self._held else k - signals.first_k
+                0 if column in self.held else k - signals.first_k
             if np.isfinite(poses[column, 0]):
                 lights[self.ids[column]] = signals.at(signals.first_k + passed)
         return lights
@@ -179,21 +173,16 @@ class ScenarioObstacles:
         other.ids = tuple(item.id for item in other.descriptions)
         count = len(self.ids)
         other.living = np.array([*sorted(agents), *range(count, count + len(more))], dtype=int)
-        other._poses, other._velocities = (
+        other.poses, other.velocities = (
             np.concatenate((values, np.full((len(values), len(more), 3), np.nan)), axis=1)
-            for values in (self._poses, self._velocities))
-        for values in (other._poses, other._velocities):
+            for values in (self.poses, self.velocities))
+        for values in (other.poses, other.velocities):
             values[:, other.living] = np.nan
             values.flags.writeable = False
-        other._static = ObjectStates(*other._only_static())
+        other._static = other._only_static()
         other.signals = {column: signals for column, signals in self.signals.items()
                          if column not in agents}
         return other
-
-    @property
-    def held(self) -> Collection[int]:
-        """Return the columns of the obstacles that are held until an event releases them."""
-        return self._held.keys()
 
     def track(self, column: int) -> tuple[FloatArray, FloatArray]:
         """
@@ -201,20 +190,20 @@ class ScenarioObstacles:
 
         :return: poses and velocities (n, 3) from its first time step on
         """
-        return self._held[column] if column in self._held else self._recorded(column)
+        return self.held[column] if column in self.held else self._recorded(column)
 
     def first_step(self, column: int) -> int:
         """Return the first time step of an obstacle's recorded course."""
-        return self.first_k + int(np.argmax(np.isfinite(self._poses[:, column, 0])))
+        return self.first_k + int(np.argmax(np.isfinite(self.poses[:, column, 0])))
 
     def _recorded(self, column: int) -> tuple[FloatArray, FloatArray]:
-        present = np.isfinite(self._poses[:, column, 0])
-        return self._poses[present, column], self._velocities[present, column]
+        present = np.isfinite(self.poses[:, column, 0])
+        return self.poses[present, column], self.velocities[present, column]
 
     def _hold(self, column: int) -> tuple[FloatArray, FloatArray]:
         """Fix an obstacle at its first pose, and return its recorded course."""
         poses, velocities = self._recorded(column)
-        self._poses[:, column], self._velocities[:, column] = poses[0], 0.0
+        self.poses[:, column], self.velocities[:, column] = poses[0], 0.0
         return poses, velocities
 
     def _fill(self, column: int, track: _Track) -> None:
@@ -234,17 +223,17 @@ class ScenarioObstacles:
             velocities[0, :2] = (track.speed * math.cos(poses[0, 2]),
                                  track.speed * math.sin(poses[0, 2]))
         poses[:, 2] = wrap_pi_array(poses[:, 2])
-        self._poses[where, column] = poses
-        self._velocities[where, column] = velocities
+        self.poses[where, column] = poses
+        self.velocities[where, column] = velocities
 
-    def _only_static(self) -> tuple[FloatArray, FloatArray]:
-        poses, velocities = self._poses[0].copy(), self._velocities[0].copy()
-        moving = [d.role is not Role.STATIC and column not in self._held
+    def _only_static(self) -> ObjectStates:
+        poses, velocities = self.poses[0].copy(), self.velocities[0].copy()
+        moving = [d.role is not Role.STATIC and column not in self.held
                   for column, d in enumerate(self.descriptions)]
         poses[moving] = np.nan
         velocities[moving] = np.nan
         poses.flags.writeable = velocities.flags.writeable = False
-        return poses, velocities
+        return ObjectStates(poses, velocities)
 
 
 def _parts(obstacle: Obstacle, source: str) -> Iterator[_Part]:
