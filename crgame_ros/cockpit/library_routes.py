@@ -40,11 +40,11 @@ def add_routes(app: web.Application, library: Library | None, backend: Backend,
             app.router.add_route(method, f'/api/{path}', _nothing)
         return
     routes = _Routes(library, backend, hub)
-    app.router.add_get('/api/scenarios', refusable(routes.scenarios))
-    app.router.add_get('/api/preview', refusable(routes.preview))
-    app.router.add_get('/api/planner', refusable(routes.planner))
-    app.router.add_post('/api/upload', refusable(routes.upload))
-    app.router.add_post('/api/upload/delete', refusable(routes.delete))
+    app.router.add_get('/api/scenarios', guarded(routes.scenarios, hub, 'load'))
+    app.router.add_get('/api/preview', guarded(routes.preview, hub, 'load'))
+    app.router.add_get('/api/planner', guarded(routes.planner, hub, 'load'))
+    app.router.add_post('/api/upload', guarded(routes.upload, hub, 'load'))
+    app.router.add_post('/api/upload/delete', guarded(routes.delete, hub, 'load'))
     app.router.add_post('/api/load', refusable(routes.load))
 
     async def closing(_: web.Application) -> AsyncIterator[None]:
@@ -63,30 +63,24 @@ class _Routes:
         # At most two bodies in memory: this one and the one that is being checked.
         self._receiving = asyncio.Semaphore(2)
 
-    async def scenarios(self, request: web.Request) -> web.Response:
-        actor(request, self._hub, 'load')
+    async def scenarios(self, _: web.Request) -> web.Response:
         return web.json_response(await self._library.listing())
 
     async def preview(self, request: web.Request) -> web.Response:
-        actor(request, self._hub, 'load')
-        content = await self._library.preview(request.query.get('id', '')[:MAX_TEXT],
-                                              asker_gone(request))
-        return web.Response(text=without_paths(content.decode()), content_type='application/json')
+        return _shown(await self._library.preview(request.query.get('id', '')[:MAX_TEXT],
+                                                  asker_gone(request)))
 
     async def planner(self, request: web.Request) -> web.Response:
-        actor(request, self._hub, 'load')
-        content = await self._library.planner_options(request.query.get('name', '')[:MAX_TEXT])
-        return web.Response(text=without_paths(content.decode()), content_type='application/json')
+        return _shown(await self._library.planner_options(
+            request.query.get('name', '')[:MAX_TEXT]))
 
     async def upload(self, request: web.Request) -> web.Response:
-        actor(request, self._hub, 'load')
         async with self._receiving:
             data = await _body(request, self._library.max_upload_bytes)
             title = request.query.get('name', '')[:MAX_TEXT]
             return web.json_response({'id': await self._library.upload(data, title)})
 
     async def delete(self, request: web.Request) -> web.Response:
-        actor(request, self._hub, 'load')
         text = await self._library.delete_upload(asked_id(await request.read()))
         return web.json_response({'ok': True, 'text': text})
 
@@ -120,6 +114,18 @@ def refusable(handler: Answer) -> Answer:
     return answer
 
 
+def guarded(handler: Answer, hub: Hub, kind: str) -> Answer:
+    """
+    Wrap a handler like `refusable`, and let it answer only who may do something.
+
+    :param kind: as in `actor`.
+    """
+    async def answer(request: web.Request) -> web.StreamResponse:
+        actor(request, hub, kind)
+        return await handler(request)
+    return refusable(answer)
+
+
 def asker_gone(request: web.Request) -> Callable[[], bool]:
     """Return a function that returns True once the client has gone."""
     def gone() -> bool:
@@ -134,6 +140,10 @@ def asked_id(body: bytes) -> str:
     :raises InputError: if it names none.
     """
     return _text(_object(body).get('id'))
+
+
+def _shown(content: bytes) -> web.Response:
+    return web.Response(text=without_paths(content.decode()), content_type='application/json')
 
 
 async def _nothing(_: web.Request) -> web.Response:

@@ -42,7 +42,6 @@ from crgame_ros.cockpit.page_messages import (
 from crgame_ros.cockpit.page_socket import PageSocket
 from crgame_ros.cockpit.request_guard import (
     ACCESS,
-    actor,
     browser_of,
     Doorkeeper,
     file_answer,
@@ -66,25 +65,12 @@ _KERNEL_UNSENT = 64 * 1024
 _log = logging.getLogger(__name__)
 
 
-def _add_invite_routes(app: web.Application, access: Access, hub: Hub) -> None:
-    """
-    Add the route.
-
-    :param access: access control with the links; it may have none.
-    :param hub: all clients.
-    """
-    async def invite(request: web.Request) -> web.Response:
-        actor(request, hub, 'invite')
-        return web.json_response({'link': _link(access, request, await request.read())})
-
-    app.router.add_post('/api/invite', library_routes.refusable(invite))
-
-
-def _link(access: Access, request: web.Request, body: bytes) -> str:
+async def _invite(request: web.Request) -> web.Response:
+    access = request.app[ACCESS]
     if access.invitations is None:
         raise CrgameError('this cockpit cannot make links: start it with --open-cockpit')
     try:
-        content = json.loads(body)
+        content = json.loads(await request.read())
         role, seat = content['role'], content.get('seat', '')
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise CrgameError('name a role') from error
@@ -92,7 +78,8 @@ def _link(access: Access, request: web.Request, body: bytes) -> str:
             or (seat and not VEHICLE_ID.fullmatch(seat)):
         raise CrgameError('there is no such role or seat')
     port = request.get_extra_info('sockname')[1]
-    return access.at_port(port).link(access.invitations.make(role, seat))
+    link = access.at_port(port).link(access.invitations.make(role, seat))
+    return web.json_response({'link': link})
 
 
 HUB = web.AppKey('hub', Hub)
@@ -137,7 +124,7 @@ def create_app(backend: Backend, access: Access, library: Library | None, *,
     app.router.add_get('/ws', connect)
     _add_page(app, page_files.read_page(page))
     library_routes.add_routes(app, library, backend, hub)
-    _add_invite_routes(app, access, hub)
+    app.router.add_post('/api/invite', library_routes.guarded(_invite, hub, 'invite'))
     if backend.mode == 'replay':
         app.add_routes(cast(ReplayControls, backend).routes())
     return app

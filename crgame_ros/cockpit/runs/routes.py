@@ -15,14 +15,7 @@ import zipfile
 from aiohttp import ClientError, ClientSession, hdrs, web, WSMsgType
 from crgame_ros.cockpit.access import cookie_for, cookie_name, new_token
 from crgame_ros.cockpit.job_process import end_module, JobProcess, start_module
-from crgame_ros.cockpit.library_routes import (
-    Answer,
-    asked_id,
-    asker_gone,
-    MAX_TEXT,
-    refusable,
-)
-from crgame_ros.cockpit.request_guard import actor
+from crgame_ros.cockpit.library_routes import asked_id, asker_gone, guarded, MAX_TEXT
 from crgame_ros.cockpit.runs.archive import PastRun, PICTURE, RunArchive
 from crgame_ros.cockpit.server import HUB
 from crgame_ros.errors import CrgameError, InputError
@@ -212,20 +205,13 @@ def add_run_routes(app: web.Application, archive: RunArchive, work: Path) -> Non
     :param work: folder for comparisons.
     """
     routes, hub = RunRoutes(archive, work), app[HUB]
-
-    def guarded(handler: Answer, kind: str) -> Answer:
-        async def answer(request: web.Request) -> web.StreamResponse:
-            actor(request, hub, kind)
-            return await handler(request)
-        return refusable(answer)
-
     for method, path, handler in (
             ('GET', '', routes.runs), ('GET', '/picture', routes.picture),
             ('GET', '/score', routes.score), ('GET', '/file', routes.file),
             ('GET', '/zip', routes.zip), ('GET', '/comparison', routes.comparison)):
-        app.router.add_route(method, f'/api/runs{path}', guarded(handler, 'runs'))
-    app.router.add_post('/api/runs/delete', guarded(routes.delete, 'delete'))
-    app.router.add_get('/replay/{run}/{rest:.*}', guarded(routes.replay, 'runs'))
+        app.router.add_route(method, f'/api/runs{path}', guarded(handler, hub, 'runs'))
+    app.router.add_post('/api/runs/delete', guarded(routes.delete, hub, 'delete'))
+    app.router.add_get('/replay/{run}/{rest:.*}', guarded(routes.replay, hub, 'runs'))
 
     async def lifetime(_: web.Application) -> AsyncIterator[None]:
         warming = asyncio.create_task(routes.warm_up())
