@@ -3,6 +3,7 @@
 """The past runs that a page may show, and the files of each."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 import hashlib
 import json
@@ -155,8 +156,9 @@ class RunArchive:
                       default=0)
         key = (run.folder, changed)
         if key not in self._told:
+            contacts = _contacts(timing)
             self._told[key] = {**_game_facts(run.folder / GAME_FILE), **_bag_facts(metadata),
-                               'contacts': _contacts(timing)}
+                               'contacts': None if contacts is None else len(contacts)}
         return self._told[key]
 
 
@@ -205,10 +207,10 @@ def _bag_facts(path: Path) -> dict[str, object]:
             'duration_s': None if lasted_ns is None else lasted_ns / 1e9}
 
 
-def _contacts(path: Path) -> int | None:
-    """Return the number of contacts in the timing report; None if there is no report."""
+def _contacts(path: Path) -> list[dict[str, object]] | None:
+    """Return the contacts in a timing report; None if there is none, or it was changed."""
     try:
-        return len(json.loads(path.read_text(encoding='utf-8')).get('contacts') or [])
+        return list(json.loads(path.read_text(encoding='utf-8')).get('contacts') or ())
     except (OSError, ValueError, AttributeError, TypeError):
         return None
 
@@ -219,13 +221,10 @@ def _remove(run: PastRun) -> None:
     own = [path for path in run.files().values() if path != game]
     for path in (*own, run.folder / PICTURE, run.folder / FINISHED_MARK, game):
         path.unlink(missing_ok=True)
-    left = [*bags_of(run.folder), run.folder]
-    for folder in left:
-        try:
+    for folder in (*bags_of(run.folder), run.folder):
+        # The folder may hold something else: another run of the session, or a foreign file.
+        with suppress(OSError):
             folder.rmdir()
-        except OSError:
-            # The folder holds something else: another run of the session, or a foreign file.
-            continue
 
 
 def run_id(folder: Path) -> str:
@@ -245,17 +244,8 @@ def files_document(session: Path, epoch: int) -> dict[str, object]:
     # Only the terminal of this machine shows the path.
     name = folder.relative_to(session.parent).as_posix()
     complete = (folder / FINISHED_MARK).exists()
+    # The page reports a contact without details if its file was moved or changed.
+    contacts = [contact for path in sorted(folder.glob('timing*.json'))
+                for contact in _contacts(path) or ()] if complete else []
     return {'epoch': epoch, 'run': run_id(folder), 'folder': name, 'names': names,
-            'complete': complete, 'contacts': _recorded_contacts(folder) if complete else []}
-
-
-def _recorded_contacts(folder: Path) -> list[dict[str, object]]:
-    """Return the contacts in the timing reports of a run."""
-    found: list[dict[str, object]] = []
-    for path in sorted(folder.glob('timing*.json')):
-        try:
-            found.extend(json.loads(path.read_text()).get('contacts') or [])
-        except (OSError, ValueError, AttributeError):
-            # The file was moved or changed: the page then reports the contact without details.
-            continue
-    return found
+            'complete': complete, 'contacts': contacts}
