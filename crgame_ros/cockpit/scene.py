@@ -17,6 +17,7 @@ from crgame_ros.game.documents import document_entry, DrivenVehicle, GameDocumen
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.task_spec import answer_key, TaskSpec
+from crgame_ros.geometry.curve import arc_length
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import first_of_junctions, RoadNetwork
 from crgame_ros.roads.signs import stop_line_ends
@@ -64,8 +65,7 @@ def simplified(vertices: Points) -> Points:
     kept = shapely.get_coordinates(shapely.simplify(shapely.LineString(points[:, :2]), TOLERANCE))
     if points.shape[1] < 3:
         return kept
-    steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
-    s = np.concatenate(([0.0], np.cumsum(steps)))
+    s = arc_length(points[:, :2])
     profile = shapely.get_coordinates(shapely.simplify(
         shapely.LineString(np.column_stack((s, points[:, 2]))), TOLERANCE))
     needed = {tuple(row) for row in kept.tolist()}
