@@ -8,16 +8,14 @@ import fcntl
 import hmac
 import ipaddress
 from pathlib import Path
-import secrets
 import socket
 import ssl
 import struct
 from urllib.parse import urlsplit
 
-from crgame_ros.cockpit.rights import ALL_RIGHTS, Invitations, Rights, UNKNOWN
+from crgame_ros.cockpit.rights import ALL_RIGHTS, Invitations, new_token, Rights, UNKNOWN
 from crgame_ros.errors import InputError
 
-TOKEN_BYTES = 24
 WITH_TOKEN = 'Open the address with the token that the cockpit printed when it started.'
 _LOOPBACK_NAMES = ('localhost', '127.0.0.1', '[::1]')
 # The request to Linux for the IPv4 address of an interface.
@@ -205,11 +203,6 @@ def check_address(host: str, port: int) -> None:
                              'choose another address or port') from error
     except ValueError as error:
         raise InputError('is no address', host[:80], 'give one of this machine') from error
-
-
-def new_token() -> str:
-    """Return a new random token."""
-    return secrets.token_urlsafe(TOKEN_BYTES)
 
 
 def _has_port(host: str) -> bool:

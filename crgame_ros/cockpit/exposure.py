@@ -12,8 +12,8 @@ import socket
 import ssl
 import subprocess
 
-from crgame_ros.cockpit.access import Access, is_loopback, new_token, reachable_addresses
-from crgame_ros.cockpit.rights import Invitations
+from crgame_ros.cockpit.access import Access, is_loopback, reachable_addresses
+from crgame_ros.cockpit.rights import Invitations, new_token
 from crgame_ros.errors import CrgameError, InputError
 
 _DAYS = 30

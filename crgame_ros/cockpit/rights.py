@@ -121,7 +121,7 @@ class Invitations:
         """
         if len(self._links) >= MAX_LINKS:
             raise CrgameError(f'{MAX_LINKS} links have been made: start the cockpit again')
-        token = secrets.token_urlsafe(TOKEN_BYTES)
+        token = new_token()
         self._save([*self._links, _Link(_digest(token), role, seat)])
         return token
 
@@ -141,7 +141,7 @@ class Invitations:
             if cookie is None or not secrets.compare_digest(link.cookie, _digest(cookie)):
                 raise InputError(USED)
             return cookie
-        cookie = secrets.token_urlsafe(TOKEN_BYTES)
+        cookie = new_token()
         used = replace(link, cookie=_digest(cookie))
         self._save([used if each is link else each for each in self._links])
         return cookie
@@ -163,6 +163,11 @@ class Invitations:
         except OSError as error:
             raise CrgameError(f'{self._path}: cannot be written ({error.strerror})') from error
         self._links = links
+
+
+def new_token() -> str:
+    """Return a new random token."""
+    return secrets.token_urlsafe(TOKEN_BYTES)
 
 
 def _digest(secret: str) -> str:

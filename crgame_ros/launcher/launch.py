@@ -214,8 +214,8 @@ def launch(arguments: Sequence[str] | None = None) -> int:
     try:
         request = parse_arguments(sys.argv[1:] if arguments is None else arguments)
         if request.replay is not None:
-            from crgame_ros.cockpit.access import new_token
             from crgame_ros.cockpit.replay_server import serve_replay
+            from crgame_ros.cockpit.rights import new_token
             return serve_replay(request.replay, request.listen or '127.0.0.1', request.port,
                                 new_token() if request.token else None, say=print_now)
         require_ros()

@@ -13,9 +13,10 @@ from urllib.parse import quote
 import zipfile
 
 from aiohttp import ClientError, ClientSession, hdrs, web, WSMsgType
-from crgame_ros.cockpit.access import cookie_for, cookie_name, new_token
+from crgame_ros.cockpit.access import cookie_for, cookie_name
 from crgame_ros.cockpit.job_process import end_module, JobProcess, start_module
 from crgame_ros.cockpit.library_routes import asked_id, asker_gone, guarded, MAX_TEXT
+from crgame_ros.cockpit.rights import new_token
 from crgame_ros.cockpit.runs.archive import PastRun, PICTURE, RunArchive
 from crgame_ros.cockpit.server import HUB
 from crgame_ros.errors import CrgameError, InputError
