@@ -7,13 +7,13 @@ Write docs/interfaces.md, the tables of the contract, from msg_defs/interfaces.y
     python3 scripts/make_interface_docs.py --check    say whether it is up to date, change nothing
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 import re
 import sys
 
 from crgame_ros.messages.contract import Contract, load_contract, Qos, Service, Topic
-from written import main_of
+from written import escaped, main_of, table
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / 'msg_defs' / 'interfaces.yaml'
@@ -51,7 +51,7 @@ def _comments(text: str) -> tuple[list[str], list[str]]:
         [line[1:].removeprefix(' ') for line in block.splitlines()]
         for block in re.findall(r'^#[^\n]*(?:\n#[^\n]*)+', text, re.MULTILINE)[:2])
     paragraphs = '\n'.join(head).split('\n\n')
-    general = [_escaped(paragraph).replace('\n', ' ') for paragraph in paragraphs[2:]]
+    general = [escaped(paragraph).replace('\n', ' ') for paragraph in paragraphs[2:]]
     rows: list[list[str]] = []
     for line in trajectories[1:]:
         label, _, text = line.strip().partition('  ')
@@ -59,13 +59,13 @@ def _comments(text: str) -> tuple[list[str], list[str]]:
             rows.append([label, text.strip()])
         else:
             rows[-1][1] += f' {label}'
-    return general, [_table(('field', 'meaning'), (
-        (', '.join(map(_code, label.split(', '))), _escaped(text)) for label, text in rows))]
+    return general, [table(('field', 'meaning'), (
+        (', '.join(map(_code, label.split(', '))), escaped(text)) for label, text in rows))]
 
 
 def _overview(contract: Contract) -> str:
-    return _table(('topic', 'type', 'QoS', 'rate [Hz]', 'from', 'to', 'recorded'), (
-        (_code(topic.name), _code(topic.type_name), _qos(topic.qos), _escaped(topic.rate),
+    return table(('topic', 'type', 'QoS', 'rate [Hz]', 'from', 'to', 'recorded'), (
+        (_code(topic.name), _code(topic.type_name), _qos(topic.qos), escaped(topic.rate),
          ', '.join(topic.producers), ', '.join(topic.consumers), 'yes' if topic.record else 'no')
         for topic in contract.topics.values()))
 
@@ -75,34 +75,24 @@ def _qos(qos: Qos) -> str:
 
 
 def _details(topic: Topic) -> str:
-    rows = ((_code(field), _escaped(meaning)) for field, meaning in topic.fields.items())
-    return f'### {_code(topic.name)}\n\n' + _table(('field', 'meaning'), rows)
+    rows = ((_code(field), escaped(meaning)) for field, meaning in topic.fields.items())
+    return f'### {_code(topic.name)}\n\n' + table(('field', 'meaning'), rows)
 
 
 def _services(services: Mapping[str, Service]) -> str:
-    return _table(('name', 'type', 'what it does'), (
-        (_code(service.name), _code(service.type_name), _escaped(service.what))
+    return table(('name', 'type', 'what it does'), (
+        (_code(service.name), _code(service.type_name), escaped(service.what))
         for service in services.values()))
 
 
 def _parameters(contract: Contract) -> str:
-    return _table(('node', 'parameter', 'type', 'meaning'), (
-        (_code(node), _code(name), row['type'], _escaped(row['what']))
+    return table(('node', 'parameter', 'type', 'meaning'), (
+        (_code(node), _code(name), row['type'], escaped(row['what']))
         for node, parameters in contract.parameters.items() for name, row in parameters.items()))
-
-
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [head, ['---'] * len(head), *rows]
-    return '\n'.join(f'| {" | ".join(cells)} |' for cells in lines)
 
 
 def _code(text: str) -> str:
     return f'`{text}`'
-
-
-def _escaped(text: str) -> str:
-    """Keep placeholders and bars from being read as markup."""
-    return text.replace('<', '&lt;').replace('|', '\\|')
 
 
 if __name__ == '__main__':

@@ -35,7 +35,7 @@ from crgame_ros.schema.file_kinds import FILE_KINDS
 from crgame_ros.schema.marks import Folder, Keyed, Meaning, Numbered, OnlyWith, Special
 from crgame_ros.schema.model_options import options_of
 from crgame_ros.schema.writing import write
-from written import main_of
+from written import escaped, main_of, table
 
 DOCS = Path(__file__).resolve().parent.parent / 'docs'
 REFERENCE = DOCS / 'keys.md'
@@ -56,7 +56,8 @@ def reference() -> str:
         for label, kind in sections(file_kind.title, top):
             if kind not in done:
                 done.add(kind)
-                parts += [f'{"##" if kind is top else "###"} {label}', summary(kind), table(kind)]
+                parts += [f'{"##" if kind is top else "###"} {label}', summary(kind),
+                          keys_table(kind)]
     return '\n\n'.join([*parts, *model_parts()]) + '\n'
 
 
@@ -70,10 +71,9 @@ def model_parts() -> Iterator[str]:
             yield f'### {kind.replace("-", " ")} `{name}`'
             yield escaped(purpose_of(registry.find(name)))
             if options := options_of(registry, name):
-                rows = [('option', 'value', 'default', 'meaning'), ('---',) * 4, *(
+                yield table(('option', 'value', 'default', 'meaning'), (
                     (f'`{each.name}`', escaped(each.wanted), each.default or 'needed',
-                     escaped(each.meaning)) for each in options)]
-                yield '\n'.join(f'| {" | ".join(row)} |' for row in rows)
+                     escaped(each.meaning)) for each in options))
 
 
 def sections(label: str, kind: Any) -> Iterator[tuple[str, Any]]:
@@ -110,9 +110,9 @@ def summary(kind: Any) -> str:
     return escaped(text)
 
 
-def table(kind: Any) -> str:
+def keys_table(kind: Any) -> str:
     """Return the keys of a dataclass as a table."""
-    rows = [['key', 'value', 'default', 'meaning'], ['---'] * 4]
+    rows = []
     form, sentences = form_of(kind), sentences_of(kind)
     for key in keys_of(kind):
         keyed = key.mark(Keyed)
@@ -124,7 +124,7 @@ def table(kind: Any) -> str:
     for name, section in form.moved:
         rows.append([f'`{name}`', f'as in `{section}`', '',
                      f'short for `{section}: {{{name}: …}}`'])
-    return '\n'.join(f'| {" | ".join(row)} |' for row in rows)
+    return table(('key', 'value', 'default', 'meaning'), rows)
 
 
 def value(key: Key, kind: Any) -> str:
@@ -166,18 +166,13 @@ def meaning(key: Key, sentences: dict[str, str]) -> str:
     return escaped(re.sub(r'\bNone\b', 'null', only + sentences.get(key.field, '')))
 
 
-def escaped(text: str) -> str:
-    """Keep bars and placeholders from being read as markup."""
-    return text.replace('|', '\\|').replace('<', '&lt;')
-
-
 def files() -> dict[Path, str]:
     """Return every page with up-to-date tables of keys."""
     found = {REFERENCE: reference()}
     for page in sorted(DOCS.glob('*.md')):
         text = page.read_text(encoding='utf-8') if page != REFERENCE else ''
         if '<!-- keys: ' in text:
-            found[page] = _TABLE.sub(lambda match: match[1] + table(getattr(
+            found[page] = _TABLE.sub(lambda match: match[1] + keys_table(getattr(
                 importlib.import_module(f'crgame_ros.{match[2]}'), match[3])) + '\n' + match[4],
                 text)
     return found

@@ -3,7 +3,7 @@
 """Writes what is made from the code into documents, or checks it."""
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 import re
 import sys
@@ -21,6 +21,17 @@ def between(text: str, name: str, made: str) -> str:
     if found != 1:
         raise SystemExit(f'the comments "{name}: begin" and "{name}: end" are missing')
     return wanted
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table as Markdown."""
+    lines = [head, ['---'] * len(head), *rows]
+    return '\n'.join(f'| {" | ".join(cells)} |' for cells in lines)
+
+
+def escaped(text: str) -> str:
+    """Keep placeholders and bars from being read as markup."""
+    return text.replace('<', '&lt;').replace('|', '\\|')
 
 
 def main_of(description: str | None, files: Callable[[], Mapping[Path, str]]) -> int:
