@@ -4,6 +4,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 import math
 
 import numpy as np
@@ -51,6 +52,11 @@ class Curve:
         """Return the points from index `first` to `last`, both included."""
         return Curve(self.points[first:last + 1], self.headings[first:last + 1])
 
+    def parts(self, cuts: Sequence[float]) -> list['Curve']:
+        """Return the parts that end and begin at some arc lengths from the start [m]."""
+        indices = [0, *map(self.index_at, cuts), len(self) - 1]
+        return [self.part(first, last) for first, last in pairwise(indices)]
+
     def reversed(self) -> 'Curve':  # noqa: A003
         """Return the curve run through the other way."""
         return Curve(self.points[::-1], self.headings[::-1] + math.pi)
@@ -62,19 +68,16 @@ class Curve:
         return int(np.argmin(np.abs(lengths - arc_length)))
 
 
-def clothoids(
-    start: Pose, segments: Sequence[tuple[float, float]], spacing: float,
-    curvature: float = 0.0,
-) -> Curve:
+def clothoids(start: Pose, segments: Sequence[tuple[float, float]], spacing: float) -> Curve:
     """
-    Chain segments whose curvature is linear in arc length, so that it is continuous throughout.
+    Chain segments whose curvature is linear in arc length, from 0 on, and continuous throughout.
 
     :param start: pose of the first point.
     :param segments: (length [m], curvature at its end [1/m]) of each.
     :param spacing: greatest distance between points [m].
-    :param curvature: at the start [1/m].
     """
     x, y, heading = start
+    curvature = 0.0
     points = [np.array([[x, y]])]
     headings = [np.array([heading])]
     for length, end_curvature in segments:

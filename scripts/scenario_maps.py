@@ -112,13 +112,12 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Problem:
-    """A planning problem: initial centre pose, speed [m/s] and goal lanelets, goal times [s]."""
+    """A planning problem: initial centre pose, speed [m/s] and goal lanelets."""
 
     id: int  # noqa: A003
     pose: Pose
     speed: float
     goal: tuple[int, ...]
-    goal_time: tuple[float, float] = (0.0, 60.0)
 
 
 class RoadMap:
@@ -194,28 +193,24 @@ class ScenarioFile:
     obstacles: tuple[Obstacle, ...] = ()
 
 
-def carriageway(
-    roads: RoadMap, curve: Curve, cuts: Sequence[float], lanes: int, width: float,
-    limit: float, *types: str, first: int = 1,
-) -> None:
+def carriageway(roads: RoadMap, curve: Curve, cuts: Sequence[float], lanes: int, width: float,
+                limit: float, *types: str) -> None:
     """
     Add parallel lanes of one direction, the curve between the outermost two bounds.
 
-    Lane j (0 the rightmost) of segment i gets the id 10 (first + i) + j + 1.
+    Lane j (0 the rightmost) of segment i (from 1) gets the id 10 i + j + 1.
 
     :param cuts: arc lengths at which one segment ends and the next begins [m].
     :param limit: speed limit [m/s].
-    :param first: number of the first segment.
     """
-    indices = [0, *(curve.index_at(cut) for cut in cuts), len(curve) - 1]
-    for segment, (start, end) in enumerate(zip(indices, indices[1:], strict=False)):
-        ids = [10 * (first + segment) + lane + 1 for lane in range(lanes)]
+    for segment, part in enumerate(curve.parts(cuts), start=1):
+        ids = [10 * segment + lane + 1 for lane in range(lanes)]
         for lane, id_ in enumerate(ids):
             right = (lane - 0.5 * lanes) * width
             markings = ('solid' if lane == lanes - 1 else 'dashed',
                         'solid' if lane == 0 else 'dashed')
-            roads.add(id_, curve.part(start, end), (right + width, right), markings, *types)
-            if segment:
+            roads.add(id_, part, (right + width, right), markings, *types)
+            if segment > 1:
                 roads.chain(id_ - 10, id_)
             if lane:
                 roads.beside(id_, id_ - 1)
@@ -231,10 +226,8 @@ def two_way(roads: RoadMap, curve: Curve, cuts: Sequence[float], width: float, l
     :param width: of each lane [m]
     :param limit: speed limit [m/s].
     """
-    indices = [0, *(curve.index_at(cut) for cut in cuts), len(curve) - 1]
-    ids = range(1, len(indices))
-    for number, first, last in zip(ids, indices, indices[1:], strict=False):
-        part = curve.part(first, last)
+    ids = range(1, len(cuts) + 2)
+    for number, part in zip(ids, curve.parts(cuts), strict=True):
         roads.add(10 * number + 1, part, (0.0, -width), ('dashed', 'curb'), *types)
         roads.add(10 * number + 2, part, (width, 0.0), ('dashed', 'curb'), *types, reverse=True)
         roads.facing(10 * number + 1, 10 * number + 2)
@@ -254,11 +247,9 @@ def street_with_parking(curve: Curve, cut: float) -> RoadMap:
     """
     roads = RoadMap()
     two_way(roads, curve, (cut,), STREET_WIDTH, 50 * KMH, 'urban')
-    middle = curve.index_at(cut)
-    for number, (first, last) in enumerate(((0, middle), (middle, len(curve) - 1)), start=1):
-        roads.add(10 * number + 3, curve.part(first, last),
-                  (-STREET_WIDTH, -STREET_WIDTH - PARKING_WIDTH), ('no_marking', 'curb'),
-                  'urban', 'parking')
+    for number, part in enumerate(curve.parts((cut,)), start=1):
+        roads.add(10 * number + 3, part, (-STREET_WIDTH, -STREET_WIDTH - PARKING_WIDTH),
+                  ('no_marking', 'curb'), 'urban', 'parking')
         roads.lanelets[10 * number + 1].markings = ('dashed', 'no_marking')
         roads.beside(10 * number + 1, 10 * number + 3)
     roads.chain(13, 23)

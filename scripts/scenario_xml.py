@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from scenario_maps import Incoming, Intersection, Lanelet, Obstacle, Problem, ScenarioFile, Sign
 
 TIME_STEP_S = 0.1
+# Until then a goal can be reached [s].
+GOAL_S = 60.0
 ZAMUNDA_GEO_NAME_ID = -999
 NO_POSITION = 999
 
@@ -175,5 +177,5 @@ def _problem(root: etree._Element, problem: Problem) -> None:
     for id_ in problem.goal:
         _add(position, 'lanelet', ref=id_)
     time = _add(goal, 'time')
-    _add(time, 'intervalStart', round(problem.goal_time[0] / TIME_STEP_S))
-    _add(time, 'intervalEnd', round(problem.goal_time[1] / TIME_STEP_S))
+    _add(time, 'intervalStart', 0)
+    _add(time, 'intervalEnd', round(GOAL_S / TIME_STEP_S))
