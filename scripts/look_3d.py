@@ -16,7 +16,7 @@ import tempfile
 import time
 
 from cockpit_person import Person
-from make_screenshots import page, SETTLES_S
+from make_screenshots import look_from, page, SHARP, show_3d
 import yaml
 
 VIEWPOINTS = ('driver', 'chase', 'bird')
@@ -33,12 +33,7 @@ def look(person: Person, where: Path, size: str) -> None:
     browser = person.browser
     browser.resize(width, height)
     for viewpoint in VIEWPOINTS:
-        frames = browser.run('crgame.view3d.viewpoint = arguments[0];'
-                             'return crgame.view3d.stats.frames', viewpoint)
-        # Every mirror has been drawn.
-        browser.wait('crgame.view3d.stats.frames >= arguments[0] + 6', 'the pictures', 60.0,
-                     arguments=(frames,))
-        time.sleep(SETTLES_S)
+        look_from(browser, viewpoint)
         path = where.with_name(f'{where.name}_{size}_{viewpoint}.png')
         browser.screenshot(path)
         calls, triangles = browser.run(COST)
@@ -54,12 +49,11 @@ def visit(roads: Path, light: str, sizes: list[str], folder: Path) -> list[str]:
             'humans': [{'id': 'hv0', 'driver': 'cockpit'}]}))
         with page(Path(temporary), 'light', str(game), '--duration', '100000') as person:
             person.take_seat('hv0')
-            person.browser.run_async('return await crgame.view3d.show(true)')
-            person.browser.wait('crgame.view3d.stats.frames > 0', 'the 3D view', 60.0)
+            show_3d(person.browser)
             person.click('[data-action="start"]')
             time.sleep(DRIVEN_S)
             person.click('[data-action="pause"]')
-            person.browser.run("crgame.view3d.settings.set('sharp', true)")
+            person.browser.run(SHARP)
             for size in sizes:
                 look(person, folder / f'{roads.stem}_{light}', size)
             return list(person.browser.console_errors())

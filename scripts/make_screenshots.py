@@ -68,6 +68,7 @@ for (const [kind, id, left, top, right, bottom, , mirror] of window.told) {
   stage.append(box);
 }
 """
+SHARP = "crgame.view3d.settings.set('sharp', true)"
 PAUSE = 'document.querySelector(\'[data-action="pause"]:enabled\')?.click()'
 
 
@@ -178,6 +179,21 @@ def shoot(browser: Browser, name: str, meant: tuple[str, ...] = ()) -> None:
     finally:
         seen.unlink(missing_ok=True)
     print(f'{path}: {path.stat().st_size / 1e3:.0f} kB', flush=True)
+
+
+def show_3d(browser: Browser) -> None:
+    """Show the 3D view, and wait for its first picture."""
+    browser.run_async('return await crgame.view3d.show(true)')
+    browser.wait('crgame.view3d.stats.frames > 0', 'the 3D view', 60.0)
+
+
+def look_from(browser: Browser, viewpoint: str) -> None:
+    """Look from a viewpoint of the 3D view, and wait until every mirror has been drawn."""
+    frames = browser.run('crgame.view3d.viewpoint = arguments[0];'
+                         'return crgame.view3d.stats.frames', viewpoint)
+    browser.wait('crgame.view3d.stats.frames >= arguments[0] + 6', 'the pictures', 60.0,
+                 arguments=(frames,))
+    time.sleep(SETTLES_S)
 
 
 def take_driving(folder: Path) -> None:
@@ -303,19 +319,13 @@ def take_3d(folder: Path) -> None:
     """Show the view from the seat beside parked cars, and from behind."""
     with page(folder, 'light', *waiting(folder, 'parked_cars')) as person:
         person.take_seat('hv0')
-        person.browser.run_async('return await crgame.view3d.show(true)')
-        person.browser.wait('crgame.view3d.stats.frames > 0', 'the 3D view')
+        show_3d(person.browser)
         person.click('[data-action="start"]')
         time.sleep(DRIVEN_S)
         person.click('[data-action="pause"]')
-        person.browser.run("crgame.view3d.settings.set('sharp', true)")
+        person.browser.run(SHARP)
         for viewpoint in ('driver', 'chase'):
-            frames = person.browser.run('return crgame.view3d.stats.frames')
-            person.browser.run('crgame.view3d.viewpoint = arguments[0]', viewpoint)
-            # Every mirror has been drawn.
-            person.browser.wait('crgame.view3d.stats.frames >= arguments[0] + 6', 'the pictures',
-                                arguments=(frames,))
-            time.sleep(SETTLES_S)
+            look_from(person.browser, viewpoint)
             shoot(person.browser, viewpoint)
 
 
@@ -324,15 +334,14 @@ def take_gaze(folder: Path) -> None:
     with page(folder, 'light', *waiting(folder, 'traffic')) as person:
         browser = person.browser
         person.take_seat('hv0')
-        browser.run_async('return await crgame.view3d.show(true)')
-        browser.wait('crgame.view3d.stats.frames > 0', 'the 3D view')
+        show_3d(browser)
         browser.run(TELLS)
         person.click('[data-action="start"]')
         time.sleep(DRIVEN_S)
         browser.wait('window.told?.some(([, , , , , , , mirror]) => mirror !== null)',
                      'what is in a mirror')
         person.click('[data-action="pause"]')
-        browser.run("crgame.view3d.settings.set('sharp', true)")
+        browser.run(SHARP)
         time.sleep(SETTLES_S)
         browser.run(BOXES)
         shoot(browser, 'gaze')
