@@ -40,11 +40,7 @@ FloatArray = NDArray[np.float64]
 
 
 class Person:
-    """
-    A person at a page that is open.
-
-    :param browser: shows the page.
-    """
+    """A person at a page that is open."""
 
     def __init__(self, browser: Browser) -> None:
         self.browser = browser

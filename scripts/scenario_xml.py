@@ -23,11 +23,7 @@ NO_POSITION = 999
 
 
 def write(scenario: ScenarioFile, directory: Path) -> Path:
-    """
-    Write `<benchmark id>.xml`.
-
-    :return: the file.
-    """
+    """Write `<benchmark id>.xml`, and return it."""
     root = etree.Element(
         'commonRoad', timeStepSize=str(TIME_STEP_S), commonRoadVersion='2020a',
         author='The crgame_ros authors', affiliation='crgame_ros',

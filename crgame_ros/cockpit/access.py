@@ -107,12 +107,7 @@ class Access:
         return given == str(port) and name in (*_LOOPBACK_NAMES, listened)
 
     def rights(self, cookie: str | None) -> Rights | None:
-        """
-        Return the rights of a browser.
-
-        :param cookie: the cookie that it presents.
-        :return: None if it is not admitted.
-        """
+        """Return the rights of the browser with a cookie; None if it is not admitted."""
         if self.invitations is not None:
             return self.invitations.rights(cookie)
         return ALL_RIGHTS if self.token is None or _same(cookie, cookie_for(self.token)) else None

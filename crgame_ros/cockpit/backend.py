@@ -23,11 +23,7 @@ class Backend(Protocol):
     mode: Literal['live', 'replay']
 
     async def start(self, hub: 'Hub') -> None:
-        """
-        Set the first documents and start sending frames; called once, before any client.
-
-        :param hub: all clients, present and future.
-        """
+        """Set the first documents and start sending frames; called once, before any client."""
 
     async def stop(self) -> None:
         """Stop sending; called once, after the last client has left."""
@@ -39,8 +35,6 @@ class Backend(Protocol):
         An `input` is awaited before the client's next message is read and must not wait for
         anything; the other messages of a client are awaited one after another.
 
-        :param client: the client that asks.
-        :param message: what it asks.
         :return: text of the reply.
         :raises CrgameError: if the request is refused; the text of the error is the reply.
         """

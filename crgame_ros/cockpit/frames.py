@@ -59,7 +59,6 @@ def encode_state(place: Place, vehicles: ArrayLike) -> bytes:
     """
     Encode the states of the driven vehicles.
 
-    :param place: its place in the run.
     :param vehicles: (V, 13) x, y [m], yaw [rad] of the rear axle, speed [m/s], steering angle
         [rad], acceleration [m/s^2], yaw rate, steering rate [rad/s], then the command in force:
         throttle, brake, steering, reverse, lights (bits: 1 left indicator, 2 right indicator,
@@ -73,7 +72,6 @@ def encode_objects(place: Place, objects: ArrayLike) -> bytes:
     """
     Encode the poses of all other objects.
 
-    :param place: its place in the run.
     :param objects: (M, 6) centre x, y [m], yaw [rad] and the velocities that lead to the pose at
         k + 1 [m/s, m/s, rad/s]; NaN where absent.
     :raises InputError: if the array has another width.
@@ -85,7 +83,6 @@ def encode_plan(place: Place, vehicle: int, points: ArrayLike) -> bytes:
     """
     Encode the plan of an AV.
 
-    :param place: its place in the run.
     :param vehicle: its index among the scene's vehicles.
     :param points: (P, 5) rear-axle x, y [m], yaw [rad], speed [m/s], time after
         `place.t` [s].
@@ -98,7 +95,6 @@ def encode_prediction(place: Place, av: int, columns: Sequence[int], points: Arr
     """
     Encode the predictions of others that an AV is sent.
 
-    :param place: its place in the run.
     :param av: index of the asking AV among the scene's vehicles.
     :param columns: (Q) predicted objects: 0 to V - 1 are vehicles, objects follow from V.
     :param points: (Q, P, 3) x, y [m], yaw [rad], one scenario time step apart, from there on.
@@ -140,7 +136,6 @@ def encode_estimate(place: Place, av: int, estimate: ArrayLike) -> bytes:
     """
     Encode the pose estimate of an AV.
 
-    :param place: its place in the run.
     :param av: index of the AV among the scene's vehicles.
     :param estimate: (8) rear-axle x, y [m], yaw [rad] in map, speed [m/s], yaw rate [rad/s], and
         the covariance of x and y: xx, xy, yy [m^2].
@@ -156,7 +151,6 @@ def encode_seen(place: Place, av: int, columns: Sequence[int]) -> bytes:
     """
     Encode which objects the planner of an AV with perception is told of.
 
-    :param place: its place in the run.
     :param av: index of the AV among the scene's vehicles.
     :param columns: (Q) seen or remembered: 0 to V - 1 are vehicles, objects follow from V.
     """
@@ -171,7 +165,6 @@ def encode_occupancy(place: Place, origin: tuple[float, float], resolution: floa
     Bytes follow origin, resolution, rows and columns, padded to a whole number of values: bit 0
     of byte 0 is cell [0, 0], and the column index runs fastest.
 
-    :param place: its place in the run.
     :param origin: x, y of the lower left corner in map [m]
     :param resolution: edge of a cell [m]
     :param occupied: (rows, columns); rows grow with y, columns with x.
@@ -189,7 +182,6 @@ def encode_criticality(place: Place, rows: ArrayLike) -> bytes:
     """
     Encode the criticality measures of the driven vehicles.
 
-    :param place: its place in the run.
     :param rows: (S, 1 + 2 measures) index of the vehicle; then of each of `MEASURED` the most
         critical value and the other object: 0 to V - 1 are vehicles, objects follow from V, -1
         is none.

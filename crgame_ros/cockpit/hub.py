@@ -71,7 +71,6 @@ class Hub:
         """
         Make room for one more client: a silent client that does not drive gives way.
 
-        :param address: address of the new client.
         :param now_s: steady clock [s].
         :return: false if there is no room.
         """
@@ -170,8 +169,6 @@ class Hub:
 
         :param abort: ends its connection at once.
         :param unsent: returns the number of bytes that its connection has not sent yet.
-        :param rights: rights of its person.
-        :param address: address from which it connects.
         :param now_s: steady clock [s].
         """
         self._count += 1

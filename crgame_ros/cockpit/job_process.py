@@ -136,7 +136,6 @@ class JobProcess:
         """
         Run a job.
 
-        :param job: its name.
         :param unwanted: returns True once no client waits for the result; the job is then ended.
         :param arguments: its arguments, as JSON content.
         :return: its result as JSON.

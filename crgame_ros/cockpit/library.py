@@ -138,7 +138,6 @@ class Library:
         """
         Store an uploaded file if it is a scenario.
 
-        :param data: the file.
         :param title: the sender's title; empty uses the benchmark id.
         :return: its id.
         :raises CrgameError: if it cannot be used, or too many are stored.

@@ -31,8 +31,6 @@ def add_routes(app: web.Application, library: Library | None, backend: Backend,
     Add the routes /api/scenarios, preview, planner, upload, upload/delete and load.
 
     :param library: None answers that there is nothing to choose.
-    :param backend: loads the chosen game.
-    :param hub: all clients.
     """
     if library is None:
         for method, path in (('GET', 'scenarios'), ('GET', 'preview'), ('GET', 'planner'),

@@ -53,7 +53,6 @@ class SensorMounts:
     """
     The mounting poses of all sensors of a game and the recent true states of the vehicles.
 
-    :param avs: AVs of the game.
     :param columns: columns of the driven vehicles in the states, by id.
     :param dt_s: simulation step [s].
     """
@@ -136,7 +135,6 @@ class MessageFrames:
     A message that breaks the interface contract raises InputError, which the caller reports or
     counts.
 
-    :param game: game of the run.
     :param descriptions: descriptions of everything that can appear.
     :ivar columns: column of everything that can appear, by id; driven vehicles first.
     :ivar mounts: mounts of the AVs' sensors, and past states of the vehicles.

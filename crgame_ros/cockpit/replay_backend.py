@@ -36,12 +36,7 @@ T = TypeVar('T')
 
 
 def recorded_criticality(reader: BagReader, run: Epoch) -> bytes | None:
-    """
-    Return the frames of the whole run, each after its length in bytes; None if none were recorded.
-
-    :param reader: the recording.
-    :param run: a run in it.
-    """
+    """Return the recorded frames, each after its length in bytes; None if there are none."""
     if CRITICALITY_TOPIC not in reader.topics:
         return None
     frames, found = MessageFrames(run.game, run.descriptions), []
@@ -62,7 +57,6 @@ def measured_criticality(run: Epoch, path: Path) -> bytes:
 
     A run of minutes takes seconds.
 
-    :param path: path of the recording.
     :raises InputError: if the run cannot be measured.
     """
     frames = MessageFrames(run.game, run.descriptions)
@@ -91,8 +85,6 @@ class Replay:
     """
     One run of a recording; not to be used by two threads at once.
 
-    :param reader: the recording.
-    :param epoch: epoch of the run.
     :param progress: called with the share of the recording that has been read, 0 to 1.
     :ivar chunk: `ChunkBuilder.build`, from memory for the chunks that were requested last.
     :raises InputError: if the recording lacks the description of the run or its states.

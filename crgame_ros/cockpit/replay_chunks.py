@@ -43,8 +43,6 @@ class ChunkBuilder:
     A chunk begins with the frames in force before it (objects, predictions, plans), so that it
     can be shown without the chunk before. Its other frames are in the order of arrival.
 
-    :param reader: the recording.
-    :param index: index of the run in it.
     :ivar chunk_s: length of a chunk [s]: whole scenario steps, about 5 s.
     :ivar count: number of chunks.
     """

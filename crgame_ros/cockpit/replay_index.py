@@ -41,7 +41,6 @@ class Outline:
     """
     A sample of state and command every `stride` steps, in little memory.
 
-    :param run: the run.
     :param duration_s: of the whole recording [s]
     :ivar stride: simulation steps between two samples.
     """

@@ -19,7 +19,6 @@ def serve_replay(path: Path, host: str = '127.0.0.1', port: int = 8080, token: s
     Show a recording in the browser until SIGINT or SIGTERM.
 
     :param path: as in `ReplayBackend`.
-    :param host: address to listen on.
     :param port: the first to try, 0 takes any.
     :param token: token of every client; None creates one if other machines can connect.
     :param say: prints a line.

@@ -167,10 +167,7 @@ class WatchedSite(web.BaseSite):
     """
     A site of the server whose connections a doorkeeper limits.
 
-    :param runner: runner of the server.
-    :param host: address or name.
     :param port: 0 for any.
-    :param keeper: counts the connections.
     :param ssl_context: of TLS; None for plain HTTP.
     """
 
@@ -253,8 +250,6 @@ def guard(access: Access, keeper: Doorkeeper,
     """
     Return the middleware that admits or refuses requests.
 
-    :param access: access control of the server.
-    :param keeper: counts the connections.
     :param also: returns whether a request without a valid cookie is admitted nevertheless.
     """
     @web.middleware

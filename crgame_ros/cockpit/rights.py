@@ -130,7 +130,6 @@ class Invitations:
         Exchange a token for a cookie.
 
         :param cookie: the browser's cookie, if any: a browser may open its own link again.
-        :return: the cookie.
         :raises InputError: with a readable sentence, if there is no such link or it was used.
         :raises CrgameError: if that cannot be saved; the link then stays unused.
         """

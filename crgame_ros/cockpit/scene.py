@@ -208,10 +208,8 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
     """
     Return the scene of a run for the page, without NaN and infinities.
 
-    :param loaded: the scenario
     :param objects: everything that can appear; driven vehicles among them are left out, because
         the game describes them
-    :param game: the resolved game
     :return: lengths in m, angles in rad, polylines as flat lists x0, y0, x1, y1, …
     """
     network = loaded.scenario.lanelet_network

@@ -95,7 +95,6 @@ def create_app(backend: Backend, access: Access, library: Library | None, *,
     Return the server's application, which starts the backend and stops it at cleanup.
 
     :param backend: the run or recording behind the page.
-    :param access: access control of the server.
     :param library: scenarios that can be chosen; None for none.
     :param page: the folder of the page; None for that of the cockpit.
     :param framed_by: origins of the only pages that may frame this one, as in the header.
@@ -135,7 +134,6 @@ async def listen(app: web.Application, host: str, port: int) -> tuple[web.AppRun
     Start to listen, at the next free port if the requested one is taken.
 
     :param app: from `create_app`; its backend is started.
-    :param host: address or name.
     :param port: the first to try; 0 takes any.
     :return: the runner, whose `cleanup` ends everything, and the port.
     :raises InputError: if no port can be used.
@@ -208,12 +206,7 @@ async def _check_stalls(hub: Hub) -> None:
 
 
 class Session(PageSocket[PageMessage]):
-    """
-    A connection that reads a client's messages and reports its end to the backend.
-
-    :param hub: all clients.
-    :param backend: carries out the messages.
-    """
+    """A connection that reads a client's messages and reports its end to the backend."""
 
     def __init__(self, hub: Hub, backend: Backend) -> None:
         # The backend comes before the answer to a close.
@@ -225,11 +218,7 @@ class Session(PageSocket[PageMessage]):
         self._worker: asyncio.Task[None] | None = None
 
     async def run(self, request: web.Request) -> web.WebSocketResponse:
-        """
-        Serve the connection until it ends.
-
-        :param request: the upgrade request.
-        """
+        """Serve the connection until it ends."""
         transport = await self.prepare(request)
         if transport is None:
             return self.socket

@@ -42,11 +42,7 @@ _ENCRYPTED = 1
 
 
 class FolderIndex:
-    """
-    The scenarios of a folder.
-
-    :param place: the folder.
-    """
+    """The scenarios of a folder."""
 
     def __init__(self, place: Path) -> None:
         self.place = place
@@ -165,11 +161,7 @@ class _Row(NamedTuple):
 
 
 class ArchiveIndex:
-    """
-    The scenarios of an archive: .zip, .tar, .tar.gz or .tgz.
-
-    :param place: the archive.
-    """
+    """The scenarios of an archive: .zip, .tar, .tar.gz or .tgz."""
 
     def __init__(self, place: Path) -> None:
         self.place = place

@@ -259,9 +259,8 @@ def store_place(place: Path) -> bool:
 
 def drop_place(path: Path) -> Path:
     """
-    Remove a place from the user's; nothing in it changes.
+    Remove a place from the user's, and return it; nothing in it changes.
 
-    :return: the place.
     :raises InputError: if it is none of them, or the file of places cannot be written.
     """
     known, place = user_places(), expanded(path).absolute()

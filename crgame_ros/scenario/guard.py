@@ -67,7 +67,6 @@ def parse_hardened(text: str, source: str, root_tag: str = 'commonRoad') -> etre
     :param text: the file's content, of any declared encoding
     :param source: file name for messages
     :param root_tag: name of the root element: of a scenario, unless it is a solution
-    :return: the root element
     :raises InputError: if it is not XML, has another root, or declares a document type.
     """
     if len(text) > MAX_BYTES:

@@ -76,7 +76,6 @@ class ScenarioObstacles:
     are interpolated. Before its first and after its last state an obstacle is absent (NaN); static
     ones are always present.
 
-    :param loaded: the scenario.
     :param without: obstacle ids to leave out.
     :param held: ids of dynamic obstacles that stand at their first pose until an event releases
         them.

@@ -104,9 +104,6 @@ class LanePrediction:
 
     All lanes are found at construction. Each lane line is sampled at equal distances, so that a
     prediction of all obstacles takes a few array look-ups.
-
-    :param obstacles: the obstacles of the scenario.
-    :param network: its road network.
     """
 
     def __init__(self, obstacles: ScenarioObstacles, network: RoadNetwork) -> None:

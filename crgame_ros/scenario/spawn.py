@@ -69,7 +69,6 @@ def lanelet_pose(network: RoadNetwork, state: VehicleState) -> VehicleState:
     """
     Return the simulator-side initial pose of an AV from lanelet geometry (CRG III-A1).
 
-    :param network: the road network
     :param state: the planner-side state of the rear axle
     :return: the same at the nearest point of the centre line, with the lane's heading
     """
@@ -93,8 +92,6 @@ def place_human(network: RoadNetwork, spec: HumanSpec, parameters: VehicleParame
     heading, and at least 0.5 m from everything. Its speed is the AV's, limited so that the vehicle
     can brake behind its leader.
 
-    :param spec: the human of the game file
-    :param parameters: parameters of the human's vehicle
     :param avs: rear-axle states of the AVs
     :param obstacles: (M) descriptions of the obstacles
     :param obstacle_states: (M) their states at k0

@@ -233,12 +233,7 @@ def run_id(folder: Path) -> str:
 
 
 def files_document(session: Path, epoch: int) -> dict[str, object]:
-    """
-    Return the files document.
-
-    :param session: folder of the session.
-    :param epoch: epoch of the run.
-    """
+    """Return the files document."""
     folder = run_folder(session, epoch)
     names = [path.name for kind in RUN_FILES for path in sorted(folder.glob(kind))]
     # Only the terminal of this machine shows the path.

@@ -202,7 +202,6 @@ def add_run_routes(app: web.Application, archive: RunArchive, work: Path) -> Non
     """
     Add the routes below /api/runs and /replay/.
 
-    :param archive: the runs.
     :param work: folder for comparisons.
     """
     routes, hub = RunRoutes(archive, work), app[HUB]
@@ -228,7 +227,6 @@ class RunRoutes:
     """
     The handlers of requests about runs.
 
-    :param archive: the runs.
     :param work: folder for comparisons.
     """
 
