@@ -3,7 +3,7 @@
 """The page's status and alarms, gathered from the diagnostics of the nodes."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 import math
 from typing import TypedDict
 
@@ -52,18 +52,13 @@ class RunStatus:
         self.real_time_factor = 1.0
         self.recording: dict[str, object] = {'state': 'none', 'messages': 0, 'megabytes': 0.0,
                                              'text': 'nothing is recorded'}
-        self.seats_lost: dict[str, bool] = {}
-        # Devices at the machine of the game, by seat.
-        self.devices: dict[str, dict[str, object]] = {}
         # Counts changes of the verdicts, so that a collision is heard when it is seen.
         self.verdicts = 0
-        self._vehicles: tuple[str, ...] = ()
-        self._traffic_late_t = -math.inf
         self._alarms: dict[str, Alarm] = {}
-        self._rules: list[tuple[str, Callable[..., None]]] = [
-            ('sim_node: run', self._add_run), ('sim_node: traffic', self._add_traffic),
-            ('timesync_node: table I', self._add_timing),
-            ('recorder_node: recording', self._add_recording)]
+        self._rules: dict[str, Callable[..., None]] = {
+            'sim_node: run': self._add_run, 'sim_node: traffic': self._add_traffic,
+            'timesync_node: table I': self._add_timing,
+            'recorder_node: recording': self._add_recording}
         self.begin(())
 
     def begin(self, vehicles: Sequence[str]) -> None:
@@ -78,8 +73,9 @@ class RunStatus:
         self.planners: dict[str, dict[str, object]] = {}
         self.drivability: dict[str, Verdict] = {}
         self.criticality: dict[str, dict[str, object]] = {}
-        self.seats_lost = {}
-        self.devices = {}
+        self.seats_lost: dict[str, bool] = {}
+        # Devices at the machine of the game, by seat.
+        self.devices: dict[str, dict[str, object]] = {}
         self.contacts: list[Violation] = []
         self.departures: list[Violation] = []
         self._stops: dict[FiredEvent, float] = {}
@@ -106,10 +102,9 @@ class RunStatus:
         name, level, text, values = status
         if t > self._traffic_late_t + LATE_TRAFFIC_S:
             self._alarm('late_traffic', 'traffic', False, '', t)
-        for known, rule in self._rules:
-            if name == known:
-                rule(level, text, values, t)
-                return
+        if (rule := self._rules.get(name)) is not None:
+            rule(level, text, values, t)
+            return
         owner, _, about = name.partition('/')
         node, _, subject = name.partition(': ')
         vehicle, _, rest = subject.partition(' ')
@@ -177,9 +172,7 @@ class RunStatus:
 
     def alarms_document(self) -> dict[str, object]:
         """Return the alarms document."""
-        return {'active': [
-            {'id': alarm.id, 'kind': alarm.kind, 'subject': alarm.subject, 'text': alarm.text,
-             'since_t': alarm.since_t} for alarm in self.alarms]}
+        return {'active': [{'id': alarm.id, **asdict(alarm)} for alarm in self.alarms]}
 
     def _alarm(self, kind: str, subject: str, on: bool, text: str, t: float) -> None:
         alarm = Alarm(kind, subject, text, t)
