@@ -402,8 +402,8 @@ class SeatOrders:
         """Remove the orders that the new content of `/seats` fulfils or makes void."""
         self._orders = {
             seat: order for seat, order in self._orders.items()
-            if seat in seats and not _is_so(order.demand, seats[seat])
-            and not _is_in_vain(order.demand, seats[seat])}
+            if seat in seats and _after(order.demand, seats[seat]) is not None
+            and not _is_so(order.demand, seats[seat])}
 
     def due(self, now_s: float) -> list[SeatDemand]:
         """
@@ -429,12 +429,8 @@ def _is_so(demand: SeatDemand, entry: SeatEntry | None) -> bool:
     return then is not None and _driver(then) == _driver(entry)
 
 
-def _is_in_vain(demand: SeatDemand, entry: SeatEntry) -> bool:
-    """Return whether an order is refused, because a person at another cockpit was first."""
-    return _after(demand, entry) is None
-
-
 def _after(demand: SeatDemand, entry: SeatEntry) -> SeatEntry | None:
+    """Return the seat after an order; None if a person at another cockpit was first."""
     try:
         # Whether an AV is its planner's or the game's makes no difference here.
         return after(entry, demand, home_of(entry.driver))
