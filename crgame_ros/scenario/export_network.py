@@ -53,17 +53,18 @@ def _schema() -> tuple[etree.XMLSchema, frozenset[str]]:
 
 def solution_schema_errors(root: etree._Element) -> list[str]:
     """Return the errors by the schema of solutions; empty for a valid solution."""
-    schema = etree.XMLSchema(etree.fromstring(_definition('CommonRoadSolution_schema.xsd')))
-    return [] if schema.validate(root) else [
-        entry.message[:_MESSAGE_LENGTH] for entry in schema.error_log]
+    return _errors(etree.XMLSchema(etree.fromstring(
+        _definition('CommonRoadSolution_schema.xsd'))), root)
 
 
 def schema_errors(root: etree._Element) -> list[str]:
     """Return the errors by the schema; empty for a valid scenario."""
-    schema, _ = _schema()
-    if schema.validate(root):
-        return []
-    return [entry.message[:_MESSAGE_LENGTH] for entry in schema.error_log]
+    return _errors(_schema()[0], root)
+
+
+def _errors(schema: etree.XMLSchema, root: etree._Element) -> list[str]:
+    return [] if schema.validate(root) else [
+        entry.message[:_MESSAGE_LENGTH] for entry in schema.error_log]
 
 
 @dataclass(frozen=True)
@@ -97,14 +98,13 @@ def write_roads(loaded: LoadedScenario, shift: int, notices: list[str]) -> Writt
         copied, remarks = _completed([deepcopy(child) for tag in _PARTS
                                       for child in root.iterchildren(tag)], shift)
         lanelets = renumber(copied, taken, remarks)
-        if not _errors_of(copied):
+        if not schema_errors(framed(copied)):
             notices += remarks
             return WrittenRoads(copied, lanelets)
     rewritten, remarks = _completed(_rewritten(loaded), shift)
     lanelets = renumber(rewritten, taken, remarks)
     kept = _without_refused(rewritten, remarks)
-    errors = _errors_of(kept)
-    if errors:
+    if errors := schema_errors(framed(kept)):
         raise InputError(f'the roads cannot be written as a valid scenario '
                          f'({"; ".join(errors[:3])})', loaded.source, 'correct the scenario')
     notices.append('the roads of the original violate the CommonRoad 2020a schema and were '
@@ -127,11 +127,6 @@ def framed(elements: list[etree._Element]) -> etree._Element:
                if (number := whole_number(node.get(name))) is not None]
     frame.append(etree.fromstring(_PROBLEM.format(max((0, *numbers)) + 1)))
     return frame
-
-
-def _errors_of(elements: list[etree._Element]) -> list[str]:
-    """Return the schema errors of the roads alone."""
-    return schema_errors(framed(elements))
 
 
 def _without_refused(elements: list[etree._Element],
@@ -178,17 +173,15 @@ def _is_dispensable(node: etree._Element) -> bool:
 def _completed(elements: list[etree._Element],
                shift: int) -> tuple[list[etree._Element], list[str]]:
     """Add required elements, drop signs that the schema lacks, and shift the lights' cycles."""
-    if not any(element.tag == 'location' for element in elements):
-        elements.insert(0, etree.fromstring(_LOCATION))
-    if not any(element.tag == 'scenarioTags' for element in elements):
-        elements.insert(1, etree.Element('scenarioTags'))
-    header = [next(element for element in elements if element.tag == tag)
-              for tag in ('location', 'scenarioTags')]
-    elements = header + [element for element in elements
-                         if element.tag not in ('location', 'scenarioTags')]
-    tags = header[1]
+    location, tags = (
+        next((element for element in elements if element.tag == tag), None)
+        for tag in ('location', 'scenarioTags'))
+    tags = etree.Element('scenarioTags') if tags is None else tags
     if tags.find(_SIMULATED) is None:
         etree.SubElement(tags, _SIMULATED)
+    elements = [etree.fromstring(_LOCATION) if location is None else location, tags,
+                *(element for element in elements
+                  if element.tag not in ('location', 'scenarioTags'))]
     for light in elements:
         for cycle in light.iterchildren('cycle') if light.tag == 'trafficLight' else ():
             _shift_cycle(cycle, shift)
