@@ -26,7 +26,6 @@ class Bounded:
     most: int
 
     def __get_pydantic_core_schema__(self, source: object, handler: Handler) -> object:
-        """Return the schema of the marked type, for pydantic."""
         schema = handler(source)
         if schema['type'] in ('list', 'tuple'):
             schema['fail_fast'] = True
@@ -43,7 +42,6 @@ class Exact:
     """A mark for the type of a value that must have it: no text is a number, no flag either."""
 
     def __get_pydantic_core_schema__(self, source: object, handler: Handler) -> object:
-        """Return the schema of the marked type, for pydantic."""
         return handler(source) | {'strict': True}
 
 
@@ -54,7 +52,6 @@ class Otherwise:
     known: str
 
     def __get_pydantic_core_schema__(self, source: object, handler: Handler) -> object:
-        """Return the schema of the marked type, for pydantic."""
         return {'type': 'function-before', 'schema': handler(source), 'function': {
             'type': 'no-info', 'function': lambda given:
             given if given in get_args(source) or not isinstance(given, str) else self.known}}
@@ -67,7 +64,6 @@ class Derived:
     names: tuple[str, ...]
 
     def __get_pydantic_core_schema__(self, source: object, handler: Handler) -> object:
-        """Return the schema of the marked class, for pydantic."""
         def write_all(value: object, write_fields: Handler) -> object:
             return write_fields(value) | {name: getattr(value, name) for name in self.names}
         return handler(source) | {
@@ -79,7 +75,6 @@ class Row:
 
     def __get_pydantic_core_schema__(self, source: Callable[..., object],
                                      handler: object) -> object:
-        """Return the schema of the marked class, for pydantic."""
         names = tuple(source.__annotations__)
 
         def made(given: object, _: object) -> object:
@@ -102,7 +97,6 @@ class Declared:
     kind: Any = None
 
     def __get_pydantic_core_schema__(self, source: object, handler: object) -> object:
-        """Return the schema of the marked type, for pydantic."""
         mark = self if self.kind is not None else replace(self, kind=source)
         return _plain_schema(
             lambda given, info: mark.read(given, f'{info.context}: {info.field_name}'),

@@ -170,7 +170,8 @@ def _conditions(kind: type[object]) -> list[Schema]:
             'oneOf': [{'required': [place]} for place in places],
             'properties': {place: False for place in form.places if place not in places}
             | {key: {'enum': list(choices[by])} for key, choices in form.choices.items()}}
-        found.append({'if': _is(form.by, by), 'then': then})
+        found.append({'if': {'properties': {form.by: {'const': by}}, 'required': [form.by]},
+                      'then': then})
     for place in form.places:
         needed = [key.name for key in keys_of(kind) if (beside := key.mark(OnlyWith)) is not None
                   and place in beside.keys and (beside.needed or key.name == place)]
@@ -178,10 +179,6 @@ def _conditions(kind: type[object]) -> list[Schema]:
             'propertyNames': {'enum': list(keys_beside(kind, place))}, 'required': needed,
             'properties': {name: {'not': {'type': 'null'}} for name in needed}}})
     return found
-
-
-def _is(key: str, value: str) -> Schema:
-    return {'properties': {key: {'const': value}}, 'required': [key]}
 
 
 class FileKind(NamedTuple):

@@ -397,13 +397,8 @@ def keys_beside(kind: type[object], place: str) -> tuple[str, ...]:
                  if (beside := key.mark(OnlyWith)) is None or place in beside.keys)
 
 
-def _refuse_unknown(name: object, known: Sequence[str], where: str, beside: str = '') -> NoReturn:
-    """
-    Refuse a key.
-
-    :param beside: the condition on which the known keys depend, for the message.
-    :raises InputError: always.
-    """
+def _refuse_unknown(name: object, known: Sequence[str], where: str, beside: str) -> NoReturn:
+    """Refuse a key; `beside` is the condition on which the known ones depend."""
     # Imported here because it is seldom needed.
     from difflib import get_close_matches
     near = get_close_matches(name[:40], known, 1) if isinstance(name, str) else ()
