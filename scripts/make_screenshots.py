@@ -18,7 +18,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from typing import NamedTuple
 
 from cockpit_person import Browser, open_browser, Person
 from crgame_ros.paths import scenarios_directory, share_directory
@@ -74,18 +73,6 @@ PAUSE = 'document.querySelector(\'[data-action="pause"]:enabled\')?.click()'
 
 class Unlucky(Exception):
     """A run during which this machine was too slow, or that took another course."""
-
-
-class Session(NamedTuple):
-    """
-    A run, and the pictures that are taken of it.
-
-    :param names: of the pictures.
-    :param take: takes them; it gets a folder for its files.
-    """
-
-    names: tuple[str, ...]
-    take: Callable[[Path], None]
 
 
 @contextmanager
@@ -357,39 +344,38 @@ def take_over(folder: Path) -> None:
         shoot(person.browser, 'over')
 
 
-SESSIONS = (
-    Session(('driving',), take_driving), Session(('light',), take_light),
-    Session(('4k',), take_4k), Session(('history', 'timing'), take_figures),
-    Session(('events', 'scenario'), take_events), Session(('alarm', 'replay'), take_alarm),
-    Session(('perception',), take_perception), Session(('driver', 'chase'), take_3d),
-    Session(('gaze',), take_gaze), Session(('over',), take_over),
-    Session(('people',), take_people),
-)
+# The pictures of each run, and what takes them; it gets a folder for its files.
+SESSIONS: dict[tuple[str, ...], Callable[[Path], None]] = {
+    ('driving',): take_driving, ('light',): take_light, ('4k',): take_4k,
+    ('history', 'timing'): take_figures, ('events', 'scenario'): take_events,
+    ('alarm', 'replay'): take_alarm, ('perception',): take_perception,
+    ('driver', 'chase'): take_3d, ('gaze',): take_gaze, ('over',): take_over,
+    ('people',): take_people}
 
 
 def main() -> None:
     """Make the pictures."""
-    names = [name for session in SESSIONS for name in session.names]
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--only', choices=names, help='the runs of this picture alone')
+    parser.add_argument('--only', choices=[name for names in SESSIONS for name in names],
+                        help='the runs of this picture alone')
     only = parser.parse_args().only
     FOLDER.mkdir(parents=True, exist_ok=True)
-    for session in SESSIONS:
-        if only is None or only in session.names:
-            take(session)
+    for names, take in SESSIONS.items():
+        if only is None or only in names:
+            insist(', '.join(names), take)
 
 
-def take(session: Session) -> None:
-    """Make the pictures of a session, again if the run was unlucky."""
+def insist(names: str, take: Callable[[Path], None]) -> None:
+    """Make the pictures of a run, again if it was unlucky."""
     for attempt in range(1, ATTEMPTS + 1):
-        print(f'{", ".join(session.names)}: run {attempt} …', flush=True)
+        print(f'{names}: run {attempt} …', flush=True)
         with tempfile.TemporaryDirectory() as folder:
             try:
-                session.take(Path(folder))
+                take(Path(folder))
                 return
             except Unlucky as error:
                 print(error, flush=True)
-    sys.exit(f'{", ".join(session.names)}: {ATTEMPTS} runs in vain')
+    sys.exit(f'{names}: {ATTEMPTS} runs in vain')
 
 
 if __name__ == '__main__':
