@@ -97,12 +97,7 @@ def _starts(counts: Sequence[int], radius: float, limit: float, seed: int) -> li
 
 
 def _detect(angles: FloatArray, radius: float) -> tuple[float, float]:
-    """
-    Count by detectors.
-
-    :param angles: (ticks, vehicles) of one ring, continuous [rad]
-    :return: flow [1/s] and harmonic mean of the speeds [m/s]
-    """
+    """Return flow [1/s] and harmonic mean speed [m/s] of continuous angles (ticks, vehicles)."""
     # In numbers of detectors passed.
     passed = angles * DETECTORS / math.tau
     number = np.floor(passed)

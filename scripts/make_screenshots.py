@@ -116,12 +116,7 @@ def address(process: 'subprocess.Popen[bytes]', log: Path) -> str:
 
 @contextmanager
 def page(folder: Path, theme: str, *arguments: str) -> Iterator[Person]:
-    """
-    Open the page of a run.
-
-    :param theme: dark or light.
-    :param arguments: of the launcher.
-    """
+    """Open the page of a run, dark or light, with some arguments of the launcher."""
     profile = Path(tempfile.mkdtemp(dir=folder))
     with launched(folder, *arguments) as where, open_browser(profile) as browser:
         browser.prefer(theme)

@@ -68,12 +68,7 @@ class Hub:
         return MappingProxyType(self._clients)
 
     def make_room(self, address: str, now_s: float) -> bool:
-        """
-        Make room for one more client: a silent client that does not drive gives way.
-
-        :param now_s: steady clock [s].
-        :return: false if there is no room.
-        """
+        """Return whether there is room for a client; a silent one without a seat gives way."""
         present = [client for client in self._clients.values() if not client.dropped]
         own = [client for client in present if client.address == address]
         if len(present) < MAX_CLIENTS and len(own) < MAX_OF_ADDRESS:
@@ -194,11 +189,7 @@ class Hub:
         del self._clients[client.id]
 
     def check_stalls(self, now_s: float) -> None:
-        """
-        Drop the clients whose connections accept no more data.
-
-        :param now_s: steady clock [s].
-        """
+        """Drop the clients whose connections accept no more data, by the steady clock [s]."""
         for client in tuple(self._clients.values()):
             client.check_stall(now_s)
             if now_s - client.heard_s > SILENT_S:

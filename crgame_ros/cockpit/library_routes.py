@@ -113,11 +113,7 @@ def refusable(handler: Answer) -> Answer:
 
 
 def guarded(handler: Answer, hub: Hub, kind: str) -> Answer:
-    """
-    Wrap a handler like `refusable`, and let it answer only who may do something.
-
-    :param kind: as in `actor`.
-    """
+    """Wrap a handler like `refusable`; it answers only who may do what `kind` names in `actor`."""
     async def answer(request: web.Request) -> web.StreamResponse:
         actor(request, hub, kind)
         return await handler(request)

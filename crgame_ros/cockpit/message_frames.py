@@ -73,11 +73,7 @@ class SensorMounts:
         return tuple(self._mounts)
 
     def add_states(self, n: int, states: FloatArray) -> None:
-        """
-        Add the true states of step n.
-
-        :param states: (V, 8) and perhaps further columns; they are copied.
-        """
+        """Add a copy of the true states of step n, (V, 8) and perhaps further columns."""
         self._states[n] = np.array(states[:, :StateColumn.YAW_RATE + 1])
         while len(self._states) > KEPT:
             self._states.popitem(last=False)
@@ -169,11 +165,7 @@ class MessageFrames:
         return states
 
     def state(self, place: Place, states: FloatArray, commands: FloatArray | None) -> Frame:
-        """
-        Return the frame of states (V, 8).
-
-        :param commands: (V, 6) consumed; None if unknown.
-        """
+        """Return the frame of states (V, 8), and of consumed commands (V, 6) if they are known."""
         return Frame('state', frames.encode_state(place, state_rows(states, commands)))
 
     def objects(self, place: Place, message: object) -> Frame:
@@ -237,11 +229,7 @@ class MessageFrames:
         return Frame(f'estimate:{column}', frames.encode_estimate(place, column, row))
 
     def scan(self, place: Place, av: str, message: Any) -> Frame | None:
-        """
-        Return the frame of a sensor_msgs/LaserScan.
-
-        :return: None if the AV lacks the sensor or its pose is unknown.
-        """
+        """Return the frame of a LaserScan; None if the AV lacks the sensor or a known pose."""
         found = self.mounts.sensor(message.header.frame_id)
         if found is None or found[0] != av:
             return None

@@ -68,11 +68,7 @@ class PageSocket(ABC, Generic[M]):
         """Remove the page from them."""
 
     async def prepare(self, request: web.Request) -> asyncio.WriteTransport | None:
-        """
-        Answer the upgrade request.
-
-        :return: the transport; None if the connection has ended already.
-        """
+        """Answer the upgrade request; return the transport, None if the connection has ended."""
         await self.socket.prepare(request)
         transport = request.transport
         self._transport = transport if isinstance(transport, asyncio.WriteTransport) else None

@@ -274,11 +274,7 @@ class ReplayBackend:
         self.close()
 
     async def command(self, client: 'Client', message: Command) -> str:
-        """
-        Raise CrgameError: a recording cannot be controlled.
-
-        :raises CrgameError: always.
-        """
+        """Raise CrgameError: a recording cannot be controlled."""
         raise CrgameError('This is a recording: nothing in it can be changed.')
 
     def joined(self, client: 'Client') -> None:
@@ -289,11 +285,7 @@ class ReplayBackend:
 
     async def load_game(self, path: Path, client: 'Client | None' = None, *,
                         takes_seat: bool = False) -> str:
-        """
-        Raise CrgameError: no simulation runs.
-
-        :raises CrgameError: always.
-        """
+        """Raise CrgameError: no simulation runs."""
         raise CrgameError('This is a recording: start ./run.sh without --replay to play a game.')
 
 

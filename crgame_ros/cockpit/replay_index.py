@@ -100,13 +100,7 @@ def perception_topics(game: GameDocument) -> dict[str, str]:
 
 
 class Places:
-    """
-    The messages of a topic: their log times [ns] and simulation steps.
-
-    :ivar log_ns: in the order of the recording.
-    :ivar first: step of each message; of its first row if it holds several.
-    :ivar last: step of its last row.
-    """
+    """The messages of a topic: their log times [ns], and steps of their first and last rows."""
 
     def __init__(self) -> None:
         self._log_ns, self._first, self._last = array('q'), array('q'), array('q')

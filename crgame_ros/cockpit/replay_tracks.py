@@ -110,11 +110,7 @@ class TrackCollector:
         self._fired: set[tuple[str, int]] = set()
 
     def add(self, recorded: DecodedMessage, newest: int | None) -> None:
-        """
-        Add one message of `topics`.
-
-        :param newest: step of the run's newest state, None before the first.
-        """
+        """Add one message of `topics`; `newest` is the step of the newest state, if any."""
         topic, _, _, message = recorded
         if topic in _LATCHED:
             self._add_latched(_LATCHED[topic], message.data, newest)
@@ -138,11 +134,7 @@ class TrackCollector:
             self._resets = int(count)
 
     def finish(self, steps: NDArray[np.int64]) -> RunTracks:
-        """
-        Return the tracks.
-
-        :param steps: steps of the recorded states.
-        """
+        """Return the tracks of a run whose states are of these steps."""
         first = int(steps[0])
         strides = np.diff(steps)
         usual = int(np.median(strides)) if len(strides) else 1

@@ -93,12 +93,7 @@ class RunStatus:
         return tuple(self._alarms.values())
 
     def add(self, status: Status, t: float) -> None:
-        """
-        Add a status.
-
-        :param status: named by node and subject, or `<v>/drivability`.
-        :param t: time of the run [s]
-        """
+        """Add a status, named by node and subject or `<v>/drivability`, of a time t [s]."""
         name, level, text, values = status
         if t > self._traffic_late_t + LATE_TRAFFIC_S:
             self._alarm('late_traffic', 'traffic', False, '', t)

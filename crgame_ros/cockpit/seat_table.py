@@ -59,12 +59,7 @@ class HeldSeat:
         self.away = True
 
     def apply_input(self, message: Input, now_s: float) -> bool:
-        """
-        Apply an input of the holder.
-
-        :param now_s: steady clock [s]
-        :return: whether the inputs differ from the ones before.
-        """
+        """Apply an input of the holder; return whether it differs from the one before."""
         self._heard_s = now_s
         before = (self._keys, self._axes)
         self._put_back = message.put_back
@@ -159,12 +154,7 @@ class SeatTable:
             entry.here and entry.person is not None and entry.person.id != item.person)
 
     def note_absent(self, lost: Mapping[str, bool], now_s: float) -> None:
-        """
-        Record the absent drivers, whose connection or whole cockpit has ended.
-
-        :param lost: seats whose driver is silent.
-        :param now_s: steady clock [s]
-        """
+        """Record the absent drivers: their connection has ended, or their seat is lost."""
         gone = {name for name, tenant in self.tenants.items() if name not in self.held
                 and (not tenant.here or lost.get(name, False))}
         self.absent_s = {name: self.absent_s.get(name, now_s) for name in gone}
@@ -289,11 +279,7 @@ class SeatTable:
         return holder
 
     def left(self, client: str) -> HeldSeat | None:
-        """
-        Remove a client that has gone; its car is stopped.
-
-        :return: the seat that it held, if any.
-        """
+        """Remove a client that has gone; return the seat that it held, whose car is stopped."""
         for item in self.held.values():
             item.requests = [other for other in item.requests if other != client]
             if item.offered_to == client:
@@ -406,11 +392,7 @@ class SeatOrders:
             and not _is_so(order.demand, seats[seat])}
 
     def due(self, now_s: float) -> list[SeatDemand]:
-        """
-        Return the orders to send again, and forget those without an answer.
-
-        :param now_s: steady clock [s].
-        """
+        """Return the orders to send again, and forget those without an answer."""
         self._orders = {seat: order for seat, order in self._orders.items()
                         if now_s - order.ordered_s < GIVE_UP_S}
         due = []

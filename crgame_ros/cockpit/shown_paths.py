@@ -12,9 +12,5 @@ _PATH = re.compile(rf'(?<![\w./])/(?:{_FOLDERS})/{_NAME}' if _FOLDERS else r'(?!
 
 
 def without_paths(text: str) -> str:
-    """
-    Return a text with absolute paths replaced by the names of their files.
-
-    :param text: readable text or JSON.
-    """
+    """Return a text or JSON with absolute paths replaced by the names of their files."""
     return _PATH.sub(lambda found: found[0].rstrip('/').rpartition('/')[2], text)

@@ -55,12 +55,7 @@ _HUMAN = re.compile(r'planning problem (\d{1,18}) is obstacle (\d{1,18})')
 
 @dataclass(frozen=True)
 class LaneletHeights:
-    """
-    Heights of a lanelet's bounds.
-
-    :param left: heights of the left bound's vertices (N) [m]
-    :param right: heights of the right bound's vertices (N) [m]
-    """
+    """The heights of the vertices of a lanelet's bounds, (N) each [m]."""
 
     left: NDArray[np.float64]
     right: NDArray[np.float64]
@@ -279,11 +274,7 @@ def _exact_problem(problem: PlanningProblem, notices: list[str]) -> PlanningProb
 
 
 def human_note(humans: Mapping[int, int]) -> str:
-    """
-    Return the text that follows `SOURCE_MARK`; empty without humans.
-
-    :param humans: obstacle ids by planning problem.
-    """
+    """Return the text after `SOURCE_MARK` that tells obstacle ids by planning problem."""
     if not humans:
         return ''
     told = ', '.join(f'planning problem {number} is obstacle {obstacle}'
@@ -297,12 +288,7 @@ def without_human_notes(source: str) -> str:
 
 
 def _read_human_note(source: str) -> dict[int, int]:
-    """
-    Return the humans in a note of `human_note`.
-
-    :param source: attribute of the file.
-    :return: obstacle ids by planning problem.
-    """
+    """Return the obstacle ids by planning problem in a source with a `human_note`."""
     mark = source.rfind(SOURCE_MARK)
     note = _NOTE.match(source, mark + len(SOURCE_MARK)) if mark >= 0 else None
     return {} if note is None else {

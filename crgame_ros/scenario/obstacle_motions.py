@@ -31,12 +31,7 @@ class ObstacleMotion(ABC):
 
 
 class Released(ObstacleMotion):
-    """
-    A recorded course that starts at another time.
-
-    :param k: time step of its first pose.
-    :param track: its poses and velocities (n, 3).
-    """
+    """A recorded course, its poses and velocities (n, 3), that begins at time step k instead."""
 
     def __init__(self, k: int, track: tuple[FloatArray, FloatArray]) -> None:
         self._k = k
@@ -116,11 +111,7 @@ class Braking(ObstacleMotion):
 
 
 class Standing(ObstacleMotion):
-    """
-    A permanent standstill.
-
-    :param pose: x [m], y [m], yaw [rad]
-    """
+    """A permanent standstill at x [m], y [m], yaw [rad]."""
 
     def __init__(self, pose: tuple[float, float, float]) -> None:
         self._pose = np.array((pose[0], pose[1], wrap_pi(pose[2])))

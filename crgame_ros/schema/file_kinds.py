@@ -182,13 +182,7 @@ def _conditions(kind: type[object]) -> list[Schema]:
 
 
 class FileKind(NamedTuple):
-    """
-    A kind of file.
-
-    :param module: module that declares it.
-    :param name: name of the class there.
-    :param title: title for people.
-    """
+    """A kind of file: module and name of the class that declares it, and a title for people."""
 
     module: str
     name: str

@@ -65,13 +65,7 @@ def _refuse(constant: str) -> NoReturn:
 
 
 class Fault(NamedTuple):
-    """
-    A fault.
-
-    :param kind: as pydantic names it.
-    :param place: keys and indices from the outside in.
-    :param said: what is wrong.
-    """
+    """What is wrong: pydantic's name of it, keys and indices from the outside in, and words."""
 
     kind: str
     place: tuple[int | str, ...]

@@ -33,11 +33,7 @@ class Message(BaseModel):
 
 
 class MessageReader(Generic[T]):
-    """
-    A reader of messages.
-
-    :param kinds: union of the classes, each with a literal `type`.
-    """
+    """A reader of messages of a union of classes, each with a literal `type`."""
 
     def __init__(self, kinds: Any) -> None:
         self._adapter: TypeAdapter[T] = TypeAdapter(

@@ -199,11 +199,7 @@ def zip_chunks(name: str, files: Mapping[str, Path]) -> Iterator[bytes]:
 
 
 def add_run_routes(app: web.Application, archive: RunArchive, work: Path) -> None:
-    """
-    Add the routes below /api/runs and /replay/.
-
-    :param work: folder for comparisons.
-    """
+    """Add the routes below /api/runs and /replay/; comparisons are written to a folder."""
     routes, hub = RunRoutes(archive, work), app[HUB]
     for method, path, handler in (
             ('GET', '', routes.runs), ('GET', '/picture', routes.picture),
@@ -224,11 +220,7 @@ def add_run_routes(app: web.Application, archive: RunArchive, work: Path) -> Non
 
 
 class RunRoutes:
-    """
-    The handlers of requests about runs.
-
-    :param work: folder for comparisons.
-    """
+    """The handlers of requests about runs; comparisons are written to a folder."""
 
     def __init__(self, archive: RunArchive, work: Path) -> None:
         self._archive = archive
