@@ -162,8 +162,7 @@ class Hub:
         """
         Add a client and send it the documents and frames that the others have.
 
-        :param abort: ends its connection at once.
-        :param unsent: returns the number of bytes that its connection has not sent yet.
+        :param abort: as of `Client`, like `unsent`.
         :param now_s: steady clock [s].
         """
         self._count += 1

@@ -88,10 +88,9 @@ def compose(path: Path, kind: str, drivers: Mapping[str, str], planners: Mapping
     :raises InputError: if the choice is not allowed, or the game cannot be used.
     """
     setup = _setup(path, kind)
-    humans = []
-    for human in setup.game.humans:
-        driver = _choice(drivers, human.id, human.driver, allowed_drivers, 'driver')
-        humans.append(replace(human, driver=driver))
+    humans = [replace(human, driver=_choice(
+        drivers, human.id, human.driver, allowed_drivers, 'driver'))
+        for human in setup.game.humans]
     avs = []
     for spec in (av.spec for av in setup.avs):
         planner = _choice(planners, spec.id, spec.planner, allowed_planners, 'planner')

@@ -37,9 +37,7 @@ class HeldSeat:
     Keys pass the keyboard filter (CRG 18-19) in simulation time. Axes are used as the page
     calibrated them (CRG 17).
 
-    :param seat_id: the vehicle.
-    :param holder: id of the client.
-    :param person: id of the client's person.
+    :param holder: id of the client, which has a person with an id of its own.
     """
 
     def __init__(self, seat_id: str, holder: str, person: str = '') -> None:
@@ -116,7 +114,7 @@ def short_source(driver: str) -> str:
 @dataclass
 class SeatTable:
     """
-    The seats of a run as the browser sees them.
+    The seats of a run as the browser sees them; clients and their persons are told by their ids.
 
     :param seats: content of `/seats`.
     :param held: the seats that clients of this server hold.
@@ -180,7 +178,6 @@ class SeatTable:
         Assign a free seat to a client, which must have left its former seat.
 
         :param names: names of the clients by id, for messages.
-        :param person: id of the client's person.
         :param may_displace: whether it may take a seat that is kept for an absent driver.
         :param now_s: steady clock [s]
         :raises InputError: if there is no such seat or another client holds it.
@@ -214,9 +211,6 @@ class SeatTable:
 
         Any client that may claim a seat that has been left may do that with it.
 
-        :param person: id of the client's person.
-        :param may_displace: whether it may take a seat that is kept for an absent driver.
-        :param now_s: steady clock [s]
         :return: the seat as it was held, None if no client held it.
         :raises InputError: if another client holds it, it is kept for another person, or no client
             ever took it.
