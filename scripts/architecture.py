@@ -4,9 +4,6 @@
 """
 Draw the package's folders and their imports into docs/architecture.md and its picture.
 
-    python3 scripts/architecture.py            write both
-    python3 scripts/architecture.py --check    say whether they are up to date, and change nothing
-
 FOLDERS is the order: a folder imports from those above it in the list only. A test checks it;
 the sentence beside each folder is its own docstring.
 """

@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Write the observations and rewards of environments into docs/gym.md.
-
-    python3 scripts/make_gym_docs.py            write the tables
-    python3 scripts/make_gym_docs.py --check    say whether they are up to date, change nothing
-"""
+"""Write the observations and rewards of environments into docs/gym.md."""
 
 from pathlib import Path
 import sys

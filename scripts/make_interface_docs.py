@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Write docs/interfaces.md, the tables of the contract, from msg_defs/interfaces.yaml.
-
-    python3 scripts/make_interface_docs.py            write the page
-    python3 scripts/make_interface_docs.py --check    say whether it is up to date, change nothing
-"""
+"""Write docs/interfaces.md, the tables of the contract, from msg_defs/interfaces.yaml."""
 
 from collections.abc import Mapping
 from pathlib import Path

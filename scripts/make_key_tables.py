@@ -3,9 +3,6 @@
 """
 Write the tables of keys in the documentation from the declarations in the code.
 
-    python3 scripts/make_key_tables.py            write docs/keys.md, and the tables in other pages
-    python3 scripts/make_key_tables.py --check    say whether they are up to date, change nothing
-
 A table in another page stands between two comments: <!-- keys: game.object_spec:ObjectSpec --> and
 <!-- keys: end -->.
 """

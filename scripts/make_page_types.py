@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Write the types of the pages' messages in TypeScript from the classes that read them.
-
-    python3 scripts/make_page_types.py            write the files
-    python3 scripts/make_page_types.py --check    say whether they are up to date, change nothing
-"""
+"""Write the types of the pages' messages in TypeScript from the classes that read them."""
 
 import json
 from pathlib import Path

@@ -4,10 +4,6 @@
 Write the columns of tables into the documentation.
 
 Those that `crgame export` makes stand in docs/tables.md, those of staircases in docs/studies.md.
-
-    python3 scripts/make_table_docs.py            write them
-    python3 scripts/make_table_docs.py --check    say whether they are up to date, change nothing
-
 They stand between two comments: <!-- columns: begin --> and <!-- columns: end -->; of staircases
 <!-- columns of staircases: begin --> and so on.
 """

@@ -43,7 +43,8 @@ def main_of(description: str | None, files: Callable[[], Mapping[Path, str]]) ->
     """
     parser = argparse.ArgumentParser(description=description,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--check', action='store_true', help='change nothing')
+    parser.add_argument('--check', action='store_true',
+                        help='say which files are out of date, and change nothing')
     check = parser.parse_args().check
     old = {path: text for path, text in files().items()
            if not path.is_file() or path.read_text(encoding='utf-8') != text}
