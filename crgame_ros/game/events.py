@@ -14,6 +14,9 @@ from crgame_ros.schema.marks import Advice, Keyed, Listed, Named, Parts, Within,
 MAX_EVENTS = 100
 # Stands for every agent of traffic.
 ALL_AGENTS = 'all'
+# Of an event or a task.
+EntryName = Annotated[str, Wording('[a-z0-9_-]{1,40}',
+                                   'give 1 to 40 of the characters a-z, 0-9, _ and -')]
 Metres = Annotated[float, Within(0.0, above=True)]
 PutType = Literal['constructionZone', 'parkedVehicle', 'roadBoundary', 'unknown']
 
@@ -239,8 +242,7 @@ class EventSpec:
 
     FORM: ClassVar[Form] = Form('see docs/games.md for the keys', first=('name', 'label'))
 
-    name: Annotated[str, Wording('[a-z0-9_-]{1,40}',
-                                 'give 1 to 40 of the characters a-z, 0-9, _ and -')]
+    name: EntryName
     action: Annotated[Action, Keyed(ACTIONS, 'action')]
     label: Annotated[str, Wording(r'[\s\S]{1,80}', 'give a text of 80 characters at most')] = ''
     when: Condition | None = None

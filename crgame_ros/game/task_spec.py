@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.events import AtStep, AtTime, Between, Near
+from crgame_ros.game.events import AtStep, AtTime, Between, EntryName, Near
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Advice, Keyed, LeftOut, Listed, Parts, Within, Wording
 
@@ -128,8 +128,7 @@ class TaskSpec:
 
     FORM: ClassVar[Form] = Form('see docs/games.md for the keys', first=('name', 'label'))
 
-    name: Annotated[str, Wording('[a-z0-9_-]{1,40}',
-                                 'give 1 to 40 of the characters a-z, 0-9, _ and -')]
+    name: EntryName
     task: Annotated[Task, Keyed(dict(TASKS), 'task')]
     label: Annotated[str, LeftOut(),
                      Wording(r'[\s\S]{0,80}', 'give a text of 80 characters at most')] = ''
