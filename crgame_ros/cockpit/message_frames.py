@@ -18,6 +18,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.documents import DrivenAv, GameDocument
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.geometry.angles import wrap_pi
+from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.joints import (
     from_joint_trajectory,
@@ -101,8 +102,8 @@ class SensorMounts:
         row = self._states[nearest][self._columns[av]]
         yaw, speed, turned = (float(row[StateColumn.YAW]), float(row[StateColumn.SPEED]),
                               float(row[StateColumn.YAW_RATE]) * passed_s)
-        x = float(row[StateColumn.X]) + speed * passed_s * math.cos(yaw + 0.5 * turned)
-        y = float(row[StateColumn.Y]) + speed * passed_s * math.sin(yaw + 0.5 * turned)
+        x, y = ahead(float(row[StateColumn.X]), float(row[StateColumn.Y]), yaw + 0.5 * turned,
+                     speed * passed_s)
         yaw += turned
         cos, sin = math.cos(yaw), math.sin(yaw)
         return (x + cos * mount.x - sin * mount.y, y + sin * mount.x + cos * mount.y,

@@ -68,7 +68,7 @@ class MarkList:
 
 
 _DIAGNOSTICS = '/diagnostics'
-_LATCHED = {'/scenario/signals': 'signals', '/scenario/events': 'events', '/seats': 'seats'}
+_LATCHED = {SIGNALS.topic: 'signals', EVENTS.topic: 'events', SEATS.topic: 'seats'}
 _FRAME_SKIP = '/timing/frame_skip'
 # Parts of the status document that are read from the recording; the page fills in the rest.
 _STATUS_PARTS = ('timing', 'planners', 'drivability', 'seats_lost')
