@@ -144,8 +144,6 @@ class ScenarioObstacles:
         :param states: of all objects then, if events have changed some.
         :param released: the time steps at which events released held obstacles, by column.
         """
-        if not self.signals:
-            return {}
         poses = (self.states_at(k) if states is None else states).poses
         lights: dict[str, int] = {}
         for column, signals in self.signals.items():
