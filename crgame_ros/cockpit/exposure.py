@@ -101,12 +101,10 @@ class Exposure:
     """
     The access options of the command line.
 
-    :param host: address to listen on.
     :param port: the first to try.
     :param token: whether clients of this machine need a token too.
     :param links: whether only links admit people, one browser each, over TLS.
     :param certificate: PEM file; None creates one if there are links, else means plain HTTP.
-    :param key: key of the certificate.
     :param private: folder that only its owner can read, used if there are links.
     """
 

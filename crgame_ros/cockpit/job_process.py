@@ -211,7 +211,6 @@ async def start_module(module: str, *arguments: str,
     """
     Start a module of this package in a process of its own, with pipes.
 
-    :param module: dotted name.
     :param own_session: whether Ctrl-C does not reach it.
     """
     # Use the package of this process, and nothing from the working directory.

@@ -40,8 +40,6 @@ class Entry:
 
     :param id: its id on the page, which does not reveal its path.
     :param kind: a game file, a scenario of a folder, or an upload.
-    :param name: name of the file.
-    :param title: readable title.
     :param path: never shown.
     """
 
@@ -57,7 +55,6 @@ class Choice:
     """
     The game that a client wants to run.
 
-    :param id: id of an entry.
     :param drivers: driver source by human vehicle.
     :param planners: planner by AV.
     :param options: options of planners by AV, as typed; AVs that are left out keep the game's.
@@ -76,8 +73,6 @@ class Library:
     :param folders: (name, path) of each; subfolders are left out.
     :param uploads: folder of uploads; created at the first one.
     :param games: folder to which loaded games are written.
-    :param reader: process for long jobs.
-    :param max_upload_bytes: size of the largest upload.
     """
 
     def __init__(self, folders: Sequence[tuple[str, Path]], uploads: Path, games: Path, *,

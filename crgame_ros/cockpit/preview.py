@@ -78,12 +78,10 @@ def compose(path: Path, kind: str, drivers: Mapping[str, str], planners: Mapping
     Return the text of the chosen game.
 
     :param kind: game, scenario or upload.
-    :param drivers: drivers of humans; vehicles that are left out keep the game's.
-    :param planners: planners of AVs; vehicles that are left out keep the game's.
+    :param drivers: of humans, as `planners` are of AVs; who is left out keeps the game's.
     :param options: options of planners by AV, as typed; AVs that are left out keep the game's,
         with the game's planner.
-    :param allowed_drivers: allowed choices besides the game's own.
-    :param allowed_planners: allowed choices besides the game's own.
+    :param allowed_drivers: choices besides the game's own, like `allowed_planners`.
     :return: the game file as `text`.
     :raises InputError: if the choice is not allowed, or the game cannot be used.
     """

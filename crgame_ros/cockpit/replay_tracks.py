@@ -32,7 +32,6 @@ class Mark:
     :param kind: collision, off_road, stale_plan, refused_plan, fallback, lost_device, reset,
         trigger, stop, late, recording or gap.
     :param subject: vehicle or event of the game, empty if it concerns the run.
-    :param text: readable text.
     :param count: how many are counted together.
     """
 
@@ -84,7 +83,6 @@ class RunTracks:
 
     :param documents: by kind as on the page (signals, events, seats, alarms) and by part
         of `status` (timing, planners, drivability, seats_lost, frames_skipped).
-    :param marks: marks of the time line.
     """
 
     documents: dict[str, Track]

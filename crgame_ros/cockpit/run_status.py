@@ -30,7 +30,6 @@ class Alarm:
 
     :param kind: collision, off_road, stale_plan, lost_device, recording, late or late_traffic.
     :param subject: vehicle or node concerned.
-    :param text: a few words.
     :param since_t: time of the run at which it began [s].
     """
 

@@ -39,7 +39,6 @@ def goal_where_it_ended(centers: NDArray[np.float64], shape: Shape) -> str:
     Return a goal from the place where a vehicle ended, and the time steps that it spent there.
 
     :param centers: (K, 3) poses of its centre at the time steps from 0 on
-    :param shape: shape of the vehicle
     """
     length, width = shape.length + 2.0 * _MARGIN[0], shape.width + 2.0 * _MARGIN[1]
     cos, sin = np.cos(centers[-1, 2]), np.sin(centers[-1, 2])
@@ -59,7 +58,6 @@ def goals_of(problem: PlanningProblem, vehicle_id: str, shift: int, last: int,
     A problem without a goal gets one that every state of the run meets.
 
     :param shift: scenario step that is time step 0
-    :param last: last time step
     :param lanelets: ids of lanelets in the file, by their ids in the scenario
     :param notices: extended by remarks on changes
     """

@@ -14,7 +14,6 @@ class IdPool:
     """
     A source of ids that are unique within a file.
 
-    :param taken: ids that are in use.
     :param notices: extended by remarks on elements that cannot keep their id.
     """
 

@@ -94,7 +94,6 @@ class LoadedScenario:
     """
     A scenario that was checked, repaired where that is safe, and read.
 
-    :param scenario: the CommonRoad scenario.
     :param planning_problems: in the order of the file; initial states are exact.
     :param xml_text: the file's text, unchanged.
     :param sha256: digest of `xml_text` in UTF-8.

@@ -40,7 +40,6 @@ class PastRun:
     A run that was recorded by this program.
 
     :param id: its id on pages, which does not reveal its path.
-    :param folder: its files.
     :param session: folder of its session.
     """
 
