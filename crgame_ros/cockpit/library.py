@@ -9,13 +9,13 @@ import hashlib
 import json
 import os
 from pathlib import Path
-import re
 import secrets
 from typing import Literal
 
 from crgame_ros.cockpit.job_process import JobProcess
 from crgame_ros.cockpit.page_messages import clean_text
 from crgame_ros.errors import CrgameError, InputError, short
+from crgame_ros.library.stored_index import id_in_file
 from crgame_ros.planner.registry import planner_names
 from crgame_ros.scenario import guard
 from crgame_ros.whole_file import write_whole
@@ -29,7 +29,6 @@ MAX_UPLOADS = 64
 MAX_UPLOADS_BYTES = 512 * 2 ** 20
 MAX_TITLE = 80
 
-_BENCHMARK = re.compile(rb'benchmarkID\s*=\s*["\']([^"\'<&]{1,80})["\']')
 _TIMELINES = ('.keys.yaml', '.joy.yaml')
 
 
@@ -274,9 +273,7 @@ def _game_title(path: Path) -> str:
 def _scenario_title(path: Path) -> str:
     """Return the benchmark id from the beginning of the file."""
     try:
-        with path.open('rb') as stream:
-            found = _BENCHMARK.search(stream.read(4096))
+        found = id_in_file(path)
     except OSError:
         found = None
-    title = clean_text(found.group(1).decode('utf-8', 'replace'), MAX_TITLE) if found else ''
-    return title or path.stem
+    return clean_text(found or '', MAX_TITLE) or path.stem

@@ -13,7 +13,7 @@ from crgame_ros.game.game import Game, HumanSpec, load_game
 from crgame_ros.gym.episode_options import game_at
 from crgame_ros.gym.episode_setups import EpisodeSetups, StartVariation
 from crgame_ros.library.lookup import find_scenario
-from crgame_ros.library.stored_index import HEAD_BYTES, header_id
+from crgame_ros.library.stored_index import id_in_file
 from crgame_ros.paths import expanded, scenarios_directory
 import numpy as np
 
@@ -170,8 +170,7 @@ def _file(game: Path | str) -> Path:
 
 def _check_head(path: Path) -> None:
     with refusing('cannot be read', path, 'check the file'):
-        with path.open('rb') as stream:
-            found = header_id(stream.read(HEAD_BYTES))
+        found = id_in_file(path)
     if found is None:
         raise InputError('is no CommonRoad scenario', str(path), 'move it out of the folder')
 

@@ -25,6 +25,7 @@ from crgame_ros.library.stored_index import (
     Entry,
     HEAD_BYTES,
     header_id,
+    id_in_file,
     keep_file,
     kept_file,
     load_index,
@@ -92,7 +93,7 @@ class FolderIndex:
     def is_current(self, entry: Entry) -> bool:
         """Return whether a scenario is still there, with the same id in it."""
         try:
-            return _header(self.path_of(entry)) == entry.header_id
+            return id_in_file(self.path_of(entry)) == entry.header_id
         except OSError:
             return False
 
@@ -127,7 +128,7 @@ class FolderIndex:
                     stamp = [status.st_mtime_ns, status.st_size]
                     row = known.get(item.name)
                     files[item.name] = row if row is not None and row[:2] == stamp else [
-                        *stamp, _header(Path(item.path))]
+                        *stamp, id_in_file(Path(item.path))]
         return files, folders
 
 
@@ -137,11 +138,6 @@ def _visible(path: Path) -> Iterator['os.DirEntry[str]']:
             # Names that are no text could not be stored; .git and the like hold no scenarios.
             if not item.name.startswith('.') and item.name.isprintable():
                 yield item
-
-
-def _header(path: Path) -> str | None:
-    with path.open('rb') as stream:
-        return header_id(stream.read(HEAD_BYTES))
 
 
 class _Row(NamedTuple):

@@ -123,6 +123,16 @@ def may_be_scenario(name: str, size: int) -> bool:
     return name.lower().endswith('.xml') and 0 < size <= MAX_BYTES
 
 
+def id_in_file(path: Path) -> str | None:
+    """
+    Return the benchmark id in a file, as `header_id`.
+
+    :raises OSError: if it cannot be read.
+    """
+    with path.open('rb') as stream:
+        return header_id(stream.read(HEAD_BYTES))
+
+
 def header_id(head: bytes) -> str | None:
     """
     Return the benchmark id in the first bytes of a file.
