@@ -8,7 +8,7 @@ import math
 from typing import TypedDict
 
 from crgame_ros.game.events import FiredEvent
-from crgame_ros.messages.status_values import BRAKING, Status, status_truth
+from crgame_ros.messages.status_values import BRAKING, Status, status_number, status_truth
 
 OK, ERROR = 0, 2
 Violation = TypedDict('Violation', {'vehicle': str, 'with': str, 't': float}, total=False)
@@ -113,8 +113,8 @@ class RunStatus:
             planner = self._planner(vehicle)
             planner.update(
                 planner=values.get('planner', ''),
-                plan_time_ms=_number(values.get('plan_time_ms')),
-                fallbacks=_number(values.get('fallbacks')))
+                plan_time_ms=status_number(values, 'plan_time_ms'),
+                fallbacks=status_number(values, 'fallbacks'))
             if text.startswith(BRAKING):
                 planner['failure'] = text.removeprefix(BRAKING)
         elif node == 'sim_node' and rest == 'seat':
@@ -124,8 +124,8 @@ class RunStatus:
             self.criticality[vehicle] = _criticality(level, values)
         elif node == 'driver_node' and rest == 'driver':
             self.devices[vehicle] = {
-                'seat': vehicle, 'device': text, 'command_ms': _number(values.get('command_ms')),
-                'input_delay_ms': _number(values.get('input_delay_ms'))}
+                'seat': vehicle, 'device': text, 'command_ms': status_number(values, 'command_ms'),
+                'input_delay_ms': status_number(values, 'input_delay_ms')}
         elif node == 'driver_node':
             self._alarm('lost_device', vehicle, level == ERROR, text, t)
 
@@ -188,8 +188,8 @@ class RunStatus:
         if text == 'ended':
             self._calm()
         self.awaited = [item for item in values.get('awaited', '').split(',') if item]
-        self.countdown_s = int(_number(values.get('countdown_s')) or 0)
-        self.real_time_factor = _number(values.get('real_time_factor')) or 1.0
+        self.countdown_s = int(status_number(values, 'countdown_s') or 0)
+        self.real_time_factor = status_number(values, 'real_time_factor') or 1.0
 
     def _add_traffic(self, level: int, text: str, _: Mapping[str, str], t: float) -> None:
         if level != OK:
@@ -197,7 +197,7 @@ class RunStatus:
             self._alarm('late_traffic', 'traffic', True, text, t)
 
     def _add_timing(self, _: int, __: str, values: Mapping[str, str], t: float) -> None:
-        self.timing = {key: _number(value) for key, value in values.items()
+        self.timing = {key: status_number(values, key) for key in values
                        if key not in ('frame_skipping', 'worst_late_step')}
         if 'worst_late_step' in values:
             self.timing['worst_late_step'] = values['worst_late_step']
@@ -207,11 +207,11 @@ class RunStatus:
 
     def _add_recording(self, level: int, text: str, values: Mapping[str, str], t: float) -> None:
         failed = level == ERROR
-        megabytes = (_number(values.get('bytes')) or 0.0) / 1e6
+        megabytes = (status_number(values, 'bytes') or 0.0) / 1e6
         self.recording = {
             'state': 'failed' if failed else
             'recorded' if status_truth(values, 'closed') else 'recording', 'text': text,
-            'messages': int(_number(values.get('messages')) or 0), 'megabytes': megabytes}
+            'messages': int(status_number(values, 'messages') or 0), 'megabytes': megabytes}
         self._alarm('recording', 'recorder', failed, text, t)
 
     def _add_drivability(self, vehicle: str, values: Mapping[str, str], t: float) -> None:
@@ -248,10 +248,10 @@ class RunStatus:
                    t: float) -> None:
         self._planner(vehicle).update(
             running=status_truth(values, 'running', True), stale=level == ERROR,
-            latency_ms=_number(values.get('latency_ms')), age_ms=_number(values.get('age_ms')),
-            accepted=int(_number(values.get('accepted')) or 0),
-            refused=int(_number(values.get('refused')) or 0),
-            of_others=int(_number(values.get('of_others')) or 0),
+            latency_ms=status_number(values, 'latency_ms'), age_ms=status_number(values, 'age_ms'),
+            accepted=int(status_number(values, 'accepted') or 0),
+            refused=int(status_number(values, 'refused') or 0),
+            of_others=int(status_number(values, 'of_others') or 0),
             planner=self._planner(vehicle)['planner'] or values.get('planner', ''),
             last_refusal=values.get('last_refusal', ''), tracking=_tracking(values))
         self._alarm('stale_plan', vehicle, level == ERROR, text, t)
@@ -261,7 +261,7 @@ def _tracking(values: Mapping[str, str]) -> dict[str, float | None] | None:
     """Return an AV's deviation from its plan, now and at worst; None unless it tracks plans."""
     if TRACKING[0] not in values:
         return None
-    return {name: _number(values.get(name)) for name in TRACKING}
+    return {name: status_number(values, name) for name in TRACKING}
 
 
 def _criticality(level: int, values: Mapping[str, str]) -> dict[str, object]:
@@ -269,19 +269,10 @@ def _criticality(level: int, values: Mapping[str, str]) -> dict[str, object]:
     worst = {name[len(_WORST):-len(_OF)]: other for name, other in values.items()
              if name.startswith(_WORST) and name.endswith(_OF)}
     return {'critical': level != OK,
-            'exposures': {name.removeprefix(_EXPOSURE): _number(value)
-                          for name, value in values.items() if name.startswith(_EXPOSURE)},
-            'worst': {name: {'value': _number(values.get(f'{_WORST}{name}')), 'of': other,
-                             't': _number(values.get(f'{_WORST}{name}_at'))}
+            'exposures': {name.removeprefix(_EXPOSURE): status_number(values, name)
+                          for name in values if name.startswith(_EXPOSURE)},
+            'worst': {name: {'value': status_number(values, f'{_WORST}{name}'), 'of': other,
+                             't': status_number(values, f'{_WORST}{name}_at')}
                       for name, other in worst.items()},
-            'thresholds': {name.removeprefix(_THRESHOLD): _number(value)
-                           for name, value in values.items() if name.startswith(_THRESHOLD)}}
-
-
-def _number(text: str | None) -> float | None:
-    """Read a number; None if there is none that JSON can represent."""
-    try:
-        value = float(text or '')
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
+            'thresholds': {name.removeprefix(_THRESHOLD): status_number(values, name)
+                           for name in values if name.startswith(_THRESHOLD)}}

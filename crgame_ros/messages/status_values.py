@@ -31,13 +31,19 @@ def status_truth(values: Mapping[str, str], key: str, default: bool = False) -> 
     return values[key].lower() == 'true' if key in values else default
 
 
-def status_amount(values: Mapping[str, str], key: str) -> float | None:
-    """Return a number that is not negative; None if there is none, whoever sent it."""
+def status_number(values: Mapping[str, str], key: str) -> float | None:
+    """Return a finite number; None if there is none, whoever sent it."""
     try:
         number = float(values.get(key, ''))
     except ValueError:
         return None
-    return number if math.isfinite(number) and number >= 0.0 else None
+    return number if math.isfinite(number) else None
+
+
+def status_amount(values: Mapping[str, str], key: str) -> float | None:
+    """Return a number that is not negative; None if there is none, whoever sent it."""
+    number = status_number(values, key)
+    return None if number is None or number < 0.0 else number
 
 
 class Status(NamedTuple):
