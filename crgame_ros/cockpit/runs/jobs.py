@@ -14,6 +14,7 @@ from crgame_ros.analysis.scores.nuplan import NuplanScore, WEIGHTS
 from crgame_ros.analysis.scores.scored_run import scores_of
 from crgame_ros.analysis.scores.vehicle import SCORE_MEASURES
 from crgame_ros.cockpit.job_process import serve_jobs
+from crgame_ros.finite_json import finite
 from crgame_ros.recording.run_record import read_run_record, RunRecord
 from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.vehicle.state import StateColumn
@@ -82,20 +83,16 @@ def _score_values(found: NuplanScore | None) -> dict[str, object]:
         return {'score': None, 'parts': []}
     parts = [(name, value, 0.0) for name, value in found.multipliers.items()]
     parts += [(name, value, WEIGHTS[name]) for name, value in found.weighted.items()]
-    return {'score': _number(found.score), 'parts': [
-        {'name': SCORE_MEASURES[name].label, 'value': _number(value), 'weight': weight,
+    return {'score': finite(float(found.score)), 'parts': [
+        {'name': SCORE_MEASURES[name].label, 'value': finite(float(value)), 'weight': weight,
          'definition': SCORE_MEASURES[name].definition} for name, value, weight in parts]}
 
 
 def _motion(record: RunRecord, number: int) -> dict[str, object]:
     """Return the distance and the greatest speed of a vehicle [m, m/s]."""
     speeds = record.log.vehicle_states[:, number, StateColumn.SPEED]
-    return {'distance': _number(float(record.ways()[number])),
-            'fastest': _number(float(np.nanmax(np.abs(speeds), initial=0.0)))}
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+    return {'distance': finite(float(record.ways()[number])),
+            'fastest': finite(float(np.nanmax(np.abs(speeds), initial=0.0)))}
 
 
 def main() -> None:
