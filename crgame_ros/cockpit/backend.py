@@ -5,7 +5,6 @@
 from pathlib import Path
 from typing import Literal, Protocol, TYPE_CHECKING
 
-from aiohttp import web
 from crgame_ros.cockpit.page_messages import Command
 
 if TYPE_CHECKING:
@@ -60,10 +59,3 @@ class Backend(Protocol):
         :return: readable text of what was done.
         :raises CrgameError: if it cannot be loaded.
         """
-
-
-class ReplayControls(Backend, Protocol):
-    """A recording behind the page, with HTTP routes of its own."""
-
-    def routes(self) -> list[web.RouteDef]:
-        """Return the routes below /api/replay/ for the server; called once."""

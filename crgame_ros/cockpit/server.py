@@ -11,12 +11,12 @@ import logging
 from pathlib import Path
 import socket
 import time
-from typing import cast
+from typing import cast, TYPE_CHECKING
 
 from aiohttp import web, WSCloseCode
 from crgame_ros.cockpit import library_routes, page_files
 from crgame_ros.cockpit.access import Access
-from crgame_ros.cockpit.backend import Backend, ReplayControls
+from crgame_ros.cockpit.backend import Backend
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Library
@@ -55,6 +55,9 @@ from crgame_ros.cockpit.request_guard import (
 from crgame_ros.cockpit.rights import ROLES
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import VEHICLE_ID
+
+if TYPE_CHECKING:
+    from crgame_ros.cockpit.replay_backend import ReplayBackend
 
 MESSAGES_PER_S = 400.0
 MESSAGE_BURST = 800.0
@@ -125,7 +128,7 @@ def create_app(backend: Backend, access: Access, library: Library | None, *,
     library_routes.add_routes(app, library, backend, hub)
     app.router.add_post('/api/invite', library_routes.guarded(_invite, hub, 'invite'))
     if backend.mode == 'replay':
-        app.add_routes(cast(ReplayControls, backend).routes())
+        app.add_routes(cast('ReplayBackend', backend).routes())
     return app
 
 
