@@ -372,10 +372,9 @@ def _refusal(access: Access, request: web.Request, port: int) -> str:
     host = request.headers.get(hdrs.HOST, '')
     if not access.allows_host(host, port):
         return f'This is not the name of this server: open http://127.0.0.1:{port}/'
-    if not is_own_origin(request.headers.get(hdrs.ORIGIN), host):
-        return 'Pages of other sites cannot use this one.'
     foreign = request.headers.get('Sec-Fetch-Site') in ('cross-site', 'same-site')
-    if foreign and request.path != '/':
+    if not is_own_origin(request.headers.get(hdrs.ORIGIN), host) \
+            or foreign and request.path != '/':
         return 'Pages of other sites cannot use this one.'
     if request.method == hdrs.METH_POST and request.headers.get('X-Crgame') != '1':
         return 'The header X-Crgame: 1 is missing.'
