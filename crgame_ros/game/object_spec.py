@@ -194,8 +194,9 @@ class MoverType:
 # the critical gap in the Highway Capacity Manual. The size of bicycles is that of recorded ones
 # (DEU_Guetersloh-36); everything else is ours.
 _CAR = MoverType(Shape.rectangle(4.508, 1.61), 13.9, 1.5, 2.0, 8.0, 1.5, 2.0, 2.579, 0.56, 1.4227)
+_WALKER = MoverType(Shape.circle(0.35), 1.34, 2.0, 1.0, 2.0, 3.0, 0.5)
 MOVER_TYPES: Mapping[str, MoverType] = MappingProxyType({
-    'pedestrian': MoverType(Shape.circle(0.35), 1.34, 2.0, 1.0, 2.0, 3.0, 0.5),
+    'pedestrian': _WALKER, 'unknown': _WALKER,
     'bicycle': MoverType(Shape.rectangle(1.9, 0.7), 4.2, 1.0, 1.5, 4.0, 1.0, 1.0, 1.05, 0.6,
                          0.525, 2.0),
     'motorcycle': MoverType(Shape.rectangle(2.2, 0.8), 13.9, 2.0, 2.5, 8.0, 1.5, 2.0, 1.4, 0.5,
@@ -204,8 +205,7 @@ MOVER_TYPES: Mapping[str, MoverType] = MappingProxyType({
     'truck': MoverType(Shape.rectangle(8.4, 2.5), 11.1, 1.0, 1.5, 6.0, 1.5, 2.0, 4.8, 0.6, 2.4,
                        1.5),
     'bus': MoverType(Shape.rectangle(12.0, 2.55), 11.1, 1.0, 1.5, 6.0, 1.5, 2.0, 6.0, 0.65, 3.0,
-                     1.5),
-    'unknown': MoverType(Shape.circle(0.35), 1.34, 2.0, 1.0, 2.0, 3.0, 0.5)})
+                     1.5)})
 PARTICLE_TYPES = ('pedestrian', 'unknown')
 BICYCLE_TYPES = tuple(name for name in MOVER_TYPES if name not in PARTICLE_TYPES)
 

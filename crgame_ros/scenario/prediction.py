@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import math
 from typing import Protocol
 
+from crgame_ros.game.object_spec import PARTICLE_TYPES
 from crgame_ros.game.objects import ObjectStates, Role
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.curve import Curve
@@ -30,7 +31,6 @@ _MAX_LANE_ANGLE = math.radians(45.0)
 # to turn along it [rad].
 _MAX_CYCLIST_ANGLE = math.radians(12.0)
 _CYCLISTS = ('bicycle',)
-_FREE_MOVERS = ('pedestrian', 'unknown')
 _SPACING = 0.5
 _BEHIND = 30.0
 # 200 m beyond a lanelet suffice for 3 s at any legal speed; no planner's horizon exceeds 5 km [m].
@@ -110,7 +110,7 @@ class LanePrediction:
         self._obstacles = obstacles
         self._network = network
         self._follows_lanes = np.array([
-            d.role is not Role.STATIC and d.type not in _FREE_MOVERS
+            d.role is not Role.STATIC and d.type not in PARTICLE_TYPES
             for d in obstacles.descriptions], dtype=bool)
         self._max_angles = np.array([
             _MAX_CYCLIST_ANGLE if d.type in _CYCLISTS else _MAX_LANE_ANGLE
