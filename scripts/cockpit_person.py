@@ -26,6 +26,8 @@ LOOK_AHEAD_S, LOOK_AHEAD_M = 1.1, 8.0
 # Keys are coarse: a value nearer than this to the wanted one is good enough.
 STEERING_TOLERANCE_DEG, SPEED_TOLERANCE = 0.25, 0.6
 POINTS_PER_PIECE = 40
+# Of a passenger car [m].
+WHEELBASE = 2.6
 POLL_S = 0.02
 STATE = """
 const { store, driving } = window.crgame;
@@ -104,15 +106,13 @@ class Person:
             'type': kind, 'code': code, 'key': key, 'windowsVirtualKeyCode': number})
 
 
-def wheel_angle(path: FloatArray, pose: tuple[float, float, float], speed: float,
-                wheelbase: float = 2.6) -> float:
+def wheel_angle(path: FloatArray, pose: tuple[float, float, float], speed: float) -> float:
     """
     Return the angle of the front wheels that leads onto a path: pure pursuit [rad].
 
     :param path: (N, 2) points [m]
     :param pose: x, y [m] and yaw [rad] of the rear axle
     :param speed: by which the look-ahead grows [m/s]
-    :param wheelbase: of a passenger car [m]
     """
     x, y, yaw = pose
     along = np.linspace(0.0, 1.0, POINTS_PER_PIECE)[:, None]
@@ -122,4 +122,4 @@ def wheel_angle(path: FloatArray, pose: tuple[float, float, float], speed: float
     distance = np.hypot(ahead, side)
     reach = max(LOOK_AHEAD_M, LOOK_AHEAD_S * speed)
     aim = int(np.argmin(np.where(ahead > 0.0, np.abs(distance - reach), np.inf)))
-    return math.atan2(2.0 * wheelbase * float(side[aim]), float(distance[aim]) ** 2)
+    return math.atan2(2.0 * WHEELBASE * float(side[aim]), float(distance[aim]) ** 2)

@@ -20,6 +20,8 @@ from scenario_traffic import loaded, rings
 FloatArray = NDArray[np.float64]
 
 LENGTH = 4.5
+# Of both models: s0 [m] and T.
+STANDSTILL_GAP, TIME_GAP_S = 2.0, 1.3
 STEP_S, SUBSTEPS = 0.1, 10
 # Detectors on every ring, evenly spaced.
 DETECTORS = 8
@@ -44,7 +46,7 @@ class Flow:
 
 
 def measure(model: str, counts: Sequence[int], circumference: float, limit: float,
-            settle_s: float, measure_s: float, seed: int = 0) -> Flow:
+            settle_s: float, measure_s: float) -> Flow:
     """
     Run vehicles of one length and one desired speed on rings until steady, and count them.
 
@@ -52,7 +54,6 @@ def measure(model: str, counts: Sequence[int], circumference: float, limit: floa
     :param counts: vehicles on each ring.
     :param circumference: [m]
     :param limit: desired speed [m/s]
-    :param seed: of the uneven gaps at the start.
     """
     scenario = loaded('Rings', rings(len(counts), circumference, limit)).scenario
     radius = circumference / math.tau
@@ -61,7 +62,7 @@ def measure(model: str, counts: Sequence[int], circumference: float, limit: floa
     traffic = Traffic(
         TrafficSpec(recorded='reactive', model=model, lateral_acceleration=LATERAL),
         RoadNetwork(scenario.lanelet_network), scenario, (),
-        _starts(counts, radius, limit, seed), STEP_S, SUBSTEPS, seed, 0)
+        _starts(counts, radius, limit), STEP_S, SUBSTEPS, 0, 0)
     settle, ticks = round(settle_s / STEP_S), round((settle_s + measure_s) / STEP_S)
     angles = np.empty((ticks - settle + 1, len(ring)))
     for k in range(ticks + 1):
@@ -76,9 +77,9 @@ def measure(model: str, counts: Sequence[int], circumference: float, limit: floa
                 np.array([x[1] for x in seen]))
 
 
-def _starts(counts: Sequence[int], radius: float, limit: float, seed: int) -> list[Adopted]:
+def _starts(counts: Sequence[int], radius: float, limit: float) -> list[Adopted]:
     """Place vehicles with uneven gaps, slower than they will be."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     starts = []
     for ring, count in enumerate(counts):
         gap = math.tau * radius / count - LENGTH
@@ -114,8 +115,7 @@ def _detect(angles: FloatArray, radius: float) -> tuple[float, float]:
     return float(np.mean(flows)), float(1.0 / np.mean(1.0 / speed))
 
 
-def equilibrium_density(model: str, speed: FloatArray, limit: float, time_gap: float = 1.3,
-                        standstill_gap: float = 2.0) -> FloatArray:
+def equilibrium_density(model: str, speed: FloatArray, limit: float) -> FloatArray:
     """
     Return the density at which vehicles follow each other steadily, in closed form.
 
@@ -125,7 +125,7 @@ def equilibrium_density(model: str, speed: FloatArray, limit: float, time_gap: f
     :param speed: (N) below the limit [m/s]
     :return: (N) [1/m]
     """
-    gap = standstill_gap + time_gap * speed
+    gap = STANDSTILL_GAP + TIME_GAP_S * speed
     if model == 'idm':
         gap = gap / np.sqrt(1.0 - (speed / limit) ** 4)
     return np.asarray(1.0 / (LENGTH + gap))

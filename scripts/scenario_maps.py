@@ -49,16 +49,15 @@ class Lanelet:
         middle: NDArray[np.float64] = 0.5 * (self.left + self.right)
         return middle
 
-    def pose_at(self, arc_length: float, offset: float = 0.0) -> Pose:
-        """Return the pose at an arc length along and an offset left of the centre line [m]."""
+    def pose_at(self, arc_length: float) -> Pose:
+        """Return the pose at an arc length along the centre line [m]."""
         center = self.center
         steps = np.diff(center, axis=0)
         lengths = np.concatenate(([0.0], np.cumsum(np.linalg.norm(steps, axis=1))))
         x, y = (float(np.interp(arc_length, lengths, center[:, axis])) for axis in (0, 1))
         headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
         middles = 0.5 * (lengths[1:] + lengths[:-1])
-        heading = float(np.interp(arc_length, middles, headings))
-        return (x - offset * np.sin(heading), y + offset * np.cos(heading), heading)
+        return x, y, float(np.interp(arc_length, middles, headings))
 
 
 @dataclass(frozen=True)

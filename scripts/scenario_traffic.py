@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Roads of any size to measure traffic on: a motorway, a town, circular roads."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
@@ -44,7 +43,7 @@ def motorway(length: float, lanes: int = 3, limit: float = 120 * KMH) -> RoadMap
     return roads
 
 
-def rings(count: int, circumference: float, limit: float, segments: int = 4) -> RoadMap:
+def rings(count: int, circumference: float, limit: float) -> RoadMap:
     """
     Build circular roads of one lane beside each other; the i-th has lanelets 10 (i + 1) + 1, ….
 
@@ -54,10 +53,10 @@ def rings(count: int, circumference: float, limit: float, segments: int = 4) -> 
     roads = RoadMap()
     radius = circumference / math.tau
     for ring in range(count):
-        ids = [10 * (ring + 1) + 1 + part for part in range(segments)]
-        for part, id_ in enumerate(ids):
-            curve = arc((ring * (2.0 * radius + 50.0), 0.0), radius, math.tau * part / segments,
-                        math.tau * (part + 1) / segments, 1.0)
+        ids = [10 * (ring + 1) + 1 + quarter for quarter in range(4)]
+        for quarter, id_ in enumerate(ids):
+            curve = arc((ring * (2.0 * radius + 50.0), 0.0), radius, math.tau * quarter / 4,
+                        math.tau * (quarter + 1) / 4, 1.0)
             roads.add(id_, curve, LANE_WIDTH, ('solid', 'solid'), 'country')
         roads.chain(*ids, ids[0])
         roads.speed_limit(limit, *ids)
@@ -127,8 +126,8 @@ def _incoming(road: Incoming, first: int, shift: int) -> Incoming:
         None if road.left_of is None else road.left_of + shift)
 
 
-def loaded(name: str, roads: RoadMap, tags: Sequence[str] = ('simulated',)) -> LoadedScenario:
+def loaded(name: str, roads: RoadMap) -> LoadedScenario:
     """Write a map as a scenario and read it as any other file: `ZAM_<name>-1_1_T-1`."""
     with tempfile.TemporaryDirectory() as folder:
-        return load_scenario(write(ScenarioFile(f'ZAM_{name}-1_1_T-1', roads, (), tuple(tags)),
-                                   Path(folder)))
+        return load_scenario(write(
+            ScenarioFile(f'ZAM_{name}-1_1_T-1', roads, (), ('simulated',)), Path(folder)))
