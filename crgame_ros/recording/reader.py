@@ -16,7 +16,7 @@ from crgame_ros.recording.metadata import METADATA_FILE, read_metadata
 from crgame_ros.recording.run_folder import parts_of
 from crgame_ros.recording.schemas import is_foreign
 from crgame_ros.recording.standard_messages import standard_types
-from crgame_ros.recording.storage import BagMessage, McapStorage, RosbagsStorage, Storage
+from crgame_ros.recording.storage import BagMessage, McapStorage, RosbagsStorage
 from crgame_ros.schema.json_documents import JsonDocument
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores, TypesysError
@@ -75,7 +75,7 @@ class BagReader:
             self.storage = _SUFFIXES[self.files[0].suffix]
             if path.is_dir():
                 notices = (f'{METADATA_FILE} is missing; `crgame recover` writes it',)
-        self._storage: Storage
+        self._storage: McapStorage | RosbagsStorage
         if self.storage == 'mcap' and not compressed:
             self._storage = McapStorage(self.files)
         else:

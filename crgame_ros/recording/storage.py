@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads the messages of a recording from MCAP files, or from SQLite or compressed files."""
 
+from bisect import bisect_left
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from crgame_ros.errors import InputError
 from crgame_ros.recording.mcap_file import McapFile, Segment
@@ -27,40 +28,14 @@ class BagMessage(NamedTuple):
     data: bytes
 
 
-class Storage(Protocol):
+class McapStorage:
     """
-    The messages of a recording.
+    The messages of the MCAP files of one recording, finished or not.
 
     :ivar topics: the recorded topics, in order of their names.
     :ivar start_ns: log time of the first message [ns], 0 without messages.
     :ivar end_ns: log time of the last message [ns], 0 without messages.
     :ivar damages: damage that does not prevent reading.
-    """
-
-    topics: tuple[BagTopic, ...]
-    start_ns: int
-    end_ns: int
-    damages: tuple[str, ...]
-
-    def messages(self, topics: Collection[str] | None, start_ns: int | None = None,
-                 end_ns: int | None = None) -> Iterator[BagMessage]:
-        """
-        Yield the messages of these topics, or of all, in order of log time.
-
-        :param start_ns: earliest log time [ns]; None for no limit.
-        :param end_ns: log time before which to stop [ns]; None for no limit.
-        """
-
-    def definition(self, type_name: str) -> str:
-        """Return the stored `ros2msg` definition of a type, empty where there is none."""
-
-    def close(self) -> None:
-        """Close the files."""
-
-
-class McapStorage:
-    """
-    The messages of the MCAP files of one recording, finished or not.
 
     :raises InputError: if a file is not an MCAP file, or a file without summary is damaged inside.
     """
@@ -86,9 +61,16 @@ class McapStorage:
             for file, tally in zip(self._files, tallies, strict=True)
             for number, channel in file.channels.items())
 
-    def messages(self, topics: Collection[str] | None, start_ns: int | None = None,
-                 end_ns: int | None = None) -> Iterator[BagMessage]:
-        """Yield the messages as `Storage` does; read only the chunks that may hold them."""
+    def messages(self, topics: Collection[str] | None, start_ns: int | None,
+                 end_ns: int | None) -> Iterator[BagMessage]:
+        """
+        Yield the messages of these topics, or of all, in order of log time.
+
+        Only the chunks that may hold them are read.
+
+        :param start_ns: earliest log time [ns]; None for no limit.
+        :param end_ns: log time before which to stop [ns]; None for no limit.
+        """
         first_ns = 0 if start_ns is None else start_ns
         last_ns = _FOREVER_NS if end_ns is None else end_ns - 1
         for message in self._ordered(topics, first_ns, last_ns):
@@ -104,9 +86,7 @@ class McapStorage:
         held: list[BagMessage] = []
         for file, segment in order:
             # Messages earlier than this segment's start are earlier than all that follow.
-            ready = 0
-            while ready < len(held) and held[ready].log_time_ns < segment.start_ns:
-                ready += 1
+            ready = bisect_left(held, segment.start_ns, key=lambda message: message.log_time_ns)
             yield from held[:ready]
             held = held[ready:] + list(self._select(file, segment, topics))
             held.sort(key=lambda message: message.log_time_ns)
@@ -163,6 +143,8 @@ class RosbagsStorage:
     """
     The messages of SQLite recordings, or of recordings that rosbag2 compressed by file or message.
 
+    Attributes and methods are those of `McapStorage`.
+
     :param path: the folder with its `metadata.yaml`, or a bare `.db3` file.
     :raises InputError: if it cannot be read.
     """
@@ -195,9 +177,9 @@ class RosbagsStorage:
                              str(self._path), 'write its metadata.yaml again with '
                              '`crgame recover`, or check it with `ros2 bag info`') from error
 
-    def messages(self, topics: Collection[str] | None, start_ns: int | None = None,
-                 end_ns: int | None = None) -> Iterator[BagMessage]:
-        """Yield the messages as `Storage` does."""
+    def messages(self, topics: Collection[str] | None, start_ns: int | None,
+                 end_ns: int | None) -> Iterator[BagMessage]:
+        """Yield the messages of these topics, or of all, in order of log time."""
         wanted = [c for c in self._connections if topics is None or c.topic in topics]
         if not wanted:
             return
