@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What repeats a recorded run: its game, its events, and the inputs of its humans."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from crgame_ros.driver.source import parse_source, ReplayDriver, SourceSpec
+from crgame_ros.driver.source import parse_source, ReplayDriver
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import EVENTS, GAME, GameDocument
+from crgame_ros.game.documents import DrivenHuman, EVENTS, GAME, GameDocument
 from crgame_ros.game.events import AtStep, FiredEvent, PlannerSwap
 from crgame_ros.game.game import Game, parse_game, PoseSpawn
 from crgame_ros.paths import expanded
@@ -105,6 +105,16 @@ class RecordedInputs(NamedTuple):
     intervals_s: NDArray[np.float64] | None
 
 
+def _replayed(setup: Setup) -> Iterator[tuple[DrivenHuman, str, Path]]:
+    """Yield each human whose driver is a recording, with its name and its path."""
+    for human in setup.humans:
+        source = parse_source(human.driver)
+        if source.kind == 'replay':
+            # It is named relative to the game file.
+            yield human, source.argument, recording_in(
+                setup.game.base / expanded(source.argument))
+
+
 def recorded_inputs(setup: Setup) -> RecordedInputs:
     """
     Find the inputs of every human whose driver is `replay:BAG`.
@@ -114,20 +124,14 @@ def recorded_inputs(setup: Setup) -> RecordedInputs:
     """
     drivers: dict[str, ReplayDriver] = {}
     intervals: NDArray[np.float64] | None = None
-    for human in setup.humans:
-        source = parse_source(human.driver)
-        if source.kind != 'replay':
-            continue
-        bag = _bag(setup, source)
-        recorded = read_game_document(bag)
-        _check_same(setup, recorded, bag)
+    for human, name, bag in _replayed(setup):
+        recorded = _recorded_in(bag, setup)
         commands, measured = replay_inputs(bag, recorded.epoch)
         if human.id not in commands:
-            raise InputError(f'{human.id} took no part', source.argument,
-                             'it has ' + ', '.join(commands))
+            raise InputError(f'{human.id} took no part', name, 'it has ' + ', '.join(commands))
         if intervals is not None and not np.array_equal(intervals, measured):
             raise InputError('was recorded with other intervals than the other replay',
-                             source.argument, 'replay humans of one recording together')
+                             name, 'replay humans of one recording together')
         drivers[human.id], intervals = ReplayDriver(commands[human.id]), measured
         drivers.update({av.id: ReplayDriver(commands[av.id])
                         for av in setup.avs if av.id in commands})
@@ -145,8 +149,9 @@ def inputs_of(result: OfflineResult) -> RecordedInputs:
     return RecordedInputs(drivers, result.intervals_s[1:, 0])
 
 
-def _check_same(setup: Setup, recorded: GameDocument, bag: Path) -> None:
-    """Refuse a recording of another scenario or rate than this run's."""
+def _recorded_in(bag: Path, setup: Setup) -> GameDocument:
+    """Return the game in a recording; refuse one of another scenario or rate than this run's."""
+    recorded = read_game_document(bag)
     if recorded.scenario_sha256 != setup.loaded.sha256:
         raise InputError(
             f'was recorded in another scenario ({recorded.benchmark_id}) than '
@@ -156,6 +161,7 @@ def _check_same(setup: Setup, recorded: GameDocument, bag: Path) -> None:
     if (here.time_step_ns, here.steps_per_tick) != (there.time_step_ns, there.steps_per_tick):
         raise InputError(f'was recorded at {1.0 / there.dt_s:g} Hz, not {1.0 / here.dt_s:g} Hz',
                          str(bag), f'give --rate {1.0 / there.dt_s:g}')
+    return recorded
 
 
 def replay_notices(setup: Setup) -> tuple[str, ...]:
@@ -165,13 +171,8 @@ def replay_notices(setup: Setup) -> tuple[str, ...]:
     :raises InputError: if a recording cannot be used, or is of another scenario or rate.
     """
     notices = []
-    for human in setup.humans:
-        source = parse_source(human.driver)
-        if source.kind != 'replay':
-            continue
-        bag = _bag(setup, source)
-        recorded = read_game_document(bag)
-        _check_same(setup, recorded, bag)
+    for human, _, bag in _replayed(setup):
+        recorded = _recorded_in(bag, setup)
         present = describe_game(setup)
         here, there = (document.human(human.id) for document in (present, recorded))
         other = [name for key, name in (('state', 'start'), ('vehicle', 'vehicle'),
@@ -206,17 +207,10 @@ def with_replayed_events(setup: Setup) -> Setup:
 
     :raises InputError: if the recording cannot be used.
     """
-    for human in setup.humans if setup.game.events else ():
-        source = parse_source(human.driver)
-        if source.kind == 'replay':
-            known, fired = read_run_events(_bag(setup, source))
-            return replace(setup, game=with_recorded_events(setup.game, fired, known))
+    for _, _, bag in _replayed(setup) if setup.game.events else ():
+        known, fired = read_run_events(bag)
+        return replace(setup, game=with_recorded_events(setup.game, fired, known))
     return setup
-
-
-def _bag(setup: Setup, source: SourceSpec) -> Path:
-    """Return the recording that a source names, relative to the game file."""
-    return recording_in(setup.game.base / expanded(source.argument))
 
 
 class RecordedEvents(NamedTuple):
