@@ -203,7 +203,7 @@ class _Indexer:
         self._places = {topic: Places() for topic in (CYCLE_TOPIC, *self._stamped, *self._plans)}
         self._places[VEHICLES_TOPIC] = self._states
         self._collector = TrackCollector(run.game)
-        self._outline = Outline(run, (reader.end_ns - reader.start_ns) / 1e9)
+        self._outline = Outline(run, reader.duration_s)
         self._inside = self._after = False
         self.topics = (*self._places, *self._collector.topics)
 

@@ -113,8 +113,7 @@ def _derive(bag: Path, suffix: str, say: Callable[[str], object],
 def _has_cycles(bag: Path) -> bool:
     try:
         with BagReader(bag, parts=True) as reader:
-            cycles = reader.topics.get(CYCLE_TOPIC)
-            return cycles is not None and cycles.message_count > 0
+            return reader.holds(CYCLE_TOPIC)
     except CrgameError:
         # The conversion reports this error.
         return True

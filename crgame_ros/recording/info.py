@@ -12,25 +12,16 @@ from crgame_ros.game.documents import GAME
 from crgame_ros.game.game import MAX_VEHICLES
 from crgame_ros.recording.metadata import BagTopic
 from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_cycles import CYCLE_TOPIC
+from crgame_ros.recording.standard_messages import TABLE, TEXT
 from crgame_ros.schema.document_marks import Bounded
 from crgame_ros.schema.json_documents import JsonDocument
 import numpy as np
 import numpy.typing as npt
 
-_GAME_TYPE = 'std_msgs/msg/String'
-_CYCLE_TOPIC = '/timing/cycle'
-_CYCLE_TYPE = 'std_msgs/msg/Float64MultiArray'
 _GAPS_SHOWN = 5
 # Integers up to this are exact in a float.
 _LARGEST_N = 2 ** 53
-
-
-@dataclass(frozen=True)
-class TopicInfo:
-    """A topic; `rate_hz` is over the whole recording, None for fewer than two messages."""
-
-    topic: BagTopic
-    rate_hz: float | None
 
 
 @dataclass(frozen=True)
@@ -61,15 +52,6 @@ class CycleInfo:
 
 
 @dataclass(frozen=True)
-class GameInfo:
-    """The game that was played: vehicle id and what drives it, for humans and for AVs."""
-
-    benchmark_id: str
-    humans: tuple[tuple[str, str], ...]
-    avs: tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True)
 class _Human:
     id: str  # noqa: A003
     driver: str
@@ -82,7 +64,7 @@ class _Av:
 
 
 @dataclass(frozen=True)
-class _Game:
+class GameInfo:
     """The part of the game document that other versions of this program write as well."""
 
     benchmark_id: str
@@ -90,8 +72,8 @@ class _Game:
     avs: Annotated[tuple[_Av, ...], Bounded(MAX_VEHICLES)]
 
 
-_GAME: JsonDocument[_Game] = JsonDocument(
-    _Game, GAME.topic, 'game of this program', 'record it again with the present version')
+_GAME: JsonDocument[GameInfo] = JsonDocument(
+    GameInfo, GAME.topic, 'game of this program', 'record it again with the present version')
 
 
 @dataclass(frozen=True)
@@ -99,6 +81,7 @@ class BagInfo:
     """
     A recording at a glance; times are log times [ns].
 
+    :param duration_s: the time from the first to the last message [s]
     :param cycles: None if `/timing/cycle` was not recorded.
     :param game: None if `/scenario/game` was not recorded.
     """
@@ -109,21 +92,18 @@ class BagInfo:
     size_bytes: int
     start_ns: int
     end_ns: int
+    duration_s: float
     complete: bool
     notices: tuple[str, ...]
-    topics: tuple[TopicInfo, ...]
+    topics: tuple[BagTopic, ...]
+    message_count: int
     game: GameInfo | None
     cycles: CycleInfo | None
 
-    @property
-    def duration_s(self) -> float:
-        """Return the time from the first to the last message [s]."""
-        return (self.end_ns - self.start_ns) / 1e9
-
-    @property
-    def message_count(self) -> int:
-        """Return the number of messages of all topics."""
-        return sum(entry.topic.message_count for entry in self.topics)
+    def rate_hz(self, topic: BagTopic) -> float | None:
+        """Return a topic's rate over the whole recording; None for fewer than two messages."""
+        several = topic.message_count > 1 and self.duration_s > 0
+        return (topic.message_count - 1) / self.duration_s if several else None
 
 
 def describe(path: Path) -> BagInfo:
@@ -134,43 +114,25 @@ def describe(path: Path) -> BagInfo:
     :raises InputError: if it cannot be read, or its game or cycles are malformed.
     """
     with BagReader(path) as reader:
-        duration_s = (reader.end_ns - reader.start_ns) / 1e9
         return BagInfo(
-            path=path, files=reader.files, storage=reader.storage,
-            size_bytes=sum(file.stat().st_size for file in reader.files),
-            start_ns=reader.start_ns, end_ns=reader.end_ns,
-            complete=reader.complete, notices=reader.notices,
-            topics=tuple(TopicInfo(topic, _rate_hz(topic.message_count, duration_s))
-                         for topic in reader.topics.values()),
-            game=_read_game(reader), cycles=_read_cycles(reader))
-
-
-def _rate_hz(count: int, duration_s: float) -> float | None:
-    return (count - 1) / duration_s if count > 1 and duration_s > 0 else None
-
-
-def _holds(reader: BagReader, topic: str, type_name: str) -> bool:
-    found = reader.topics.get(topic)
-    return found is not None and found.message_count > 0 and found.type_name == type_name
+            path, reader.files, reader.storage, sum(file.stat().st_size for file in reader.files),
+            reader.start_ns, reader.end_ns, reader.duration_s, reader.complete, reader.notices,
+            tuple(reader.topics.values()), reader.message_count, _read_game(reader),
+            _read_cycles(reader))
 
 
 def _read_game(reader: BagReader) -> GameInfo | None:
-    if not _holds(reader, GAME.topic, _GAME_TYPE):
+    if not reader.holds(GAME.topic, TEXT):
         return None
     latched = reader.latched(GAME.topic)
     try:
-        game = _GAME.read(latched.message.data if latched else '')
+        return _GAME.read(latched.message.data if latched else '')
     except InputError as error:
         raise InputError(error.what, f'{reader.path}, {error.where}', error.remedy) from error
-    return GameInfo(
-        game.benchmark_id, tuple((human.id, human.driver) for human in game.humans),
-        tuple((av.id, av.planner) for av in game.avs))
 
 
 def _read_cycles(reader: BagReader) -> CycleInfo | None:
-    if not _holds(reader, _CYCLE_TOPIC, _CYCLE_TYPE):
-        return None
-    found = list(_cycle_numbers(reader))
+    found = list(_cycle_numbers(reader)) if reader.holds(CYCLE_TOPIC, TABLE) else []
     if not found:
         return None
     cycles = np.concatenate(found)
@@ -180,17 +142,17 @@ def _read_cycles(reader: BagReader) -> CycleInfo | None:
 def _cycle_numbers(reader: BagReader) -> Iterator[npt.NDArray[np.int64]]:
     """Yield arrays of rows (epoch, n), without those of foreign messages."""
     refusal, found = None, False
-    for _, _, _, message in reader.readable([_CYCLE_TOPIC]):
+    for _, _, _, message in reader.readable([CYCLE_TOPIC]):
         try:
             rows, columns = message.layout.dim
             names = columns.label.split(',')
             table = message.data.reshape(rows.size, len(names))
             picked = table[:, [names.index('epoch'), names.index('n')]]
         except ValueError as error:
-            refusal = InputError(f'{_CYCLE_TOPIC} is not as the contract has it ({error})',
+            refusal = InputError(f'{CYCLE_TOPIC} is not as the contract has it ({error})',
                                  str(reader.path),
                                  'its second dimension names the columns, epoch and n among them')
-            reader.foreign[_CYCLE_TOPIC] += 1
+            reader.foreign[CYCLE_TOPIC] += 1
             continue
         found = True
         yield picked[(np.abs(picked) < _LARGEST_N).all(axis=1)].astype(np.int64)
@@ -219,11 +181,11 @@ def format_info(info: BagInfo) -> str:
         *(f'           {notice}' for notice in info.notices)]
     if info.game is not None:
         lines += [f'scenario   {info.game.benchmark_id}',
-                  f'humans     {_drivers(info.game.humans)}',
-                  f'avs        {_drivers(info.game.avs)}']
+                  f'humans     {_drivers((item.id, item.driver) for item in info.game.humans)}',
+                  f'avs        {_drivers((item.id, item.planner) for item in info.game.avs)}']
     if info.cycles is not None:
         lines += _format_cycles(info.cycles)
-    return '\n'.join([*lines, '', *_format_topics(info.topics)])
+    return '\n'.join([*lines, '', *_format_topics(info)])
 
 
 def _drivers(pairs: Iterable[tuple[str, str]]) -> str:
@@ -239,12 +201,12 @@ def _format_cycles(cycles: CycleInfo) -> list[str]:
     return lines
 
 
-def _format_topics(topics: Iterable[TopicInfo]) -> list[str]:
+def _format_topics(info: BagInfo) -> list[str]:
     table = [('topic', 'type', 'messages', 'Hz', 'QoS')]
-    table += [(entry.topic.name, entry.topic.type_name, str(entry.topic.message_count),
-               '-' if entry.rate_hz is None else f'{entry.rate_hz:.1f}',
+    table += [(topic.name, topic.type_name, str(topic.message_count),
+               '-' if (rate_hz := info.rate_hz(topic)) is None else f'{rate_hz:.1f}',
                '; '.join(f'{qos.reliability} {qos.durability} {qos.depth}'
-                         for qos in entry.topic.qos) or '-') for entry in topics]
+                         for qos in topic.qos) or '-') for topic in info.topics]
     widths = [max(len(row[column]) for row in table) for column in range(4)]
     return [f'{row[0]:<{widths[0]}}  {row[1]:<{widths[1]}}  {row[2]:>{widths[2]}}  '
             f'{row[3]:>{widths[3]}}  {row[4]}'.rstrip() for row in table]

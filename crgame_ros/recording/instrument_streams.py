@@ -95,8 +95,7 @@ def read_streams(path: Path, epoch: int | None = None) -> tuple[RecordedStream, 
     :raises InputError: if there is no such run in it.
     """
     with BagReader(path, parts=True) as reader:
-        if STREAMS.topic not in reader.topics or CYCLE_TOPIC not in reader.topics \
-                or not reader.topics[STREAMS.topic].message_count:
+        if not reader.holds(STREAMS.topic) or CYCLE_TOPIC not in reader.topics:
             return ()
         game = read_epoch(reader, epoch).game
         starts, from_s, until_s = _clock(reader, game.epoch)

@@ -109,6 +109,17 @@ class BagReader:
         """Return the number of messages of all topics."""
         return sum(topic.message_count for topic in self.topics.values())
 
+    @property
+    def duration_s(self) -> float:
+        """Return the time from the first to the last message [s]."""
+        return (self.end_ns - self.start_ns) / 1e9
+
+    def holds(self, topic: str, type_name: str | None = None) -> bool:
+        """Return whether it has messages of a topic, which is of this type if one is given."""
+        found = self.topics.get(topic)
+        return found is not None and found.message_count > 0 \
+            and type_name in (None, found.type_name)
+
     def messages(self, topics: Collection[str] | None = None, start_ns: int | None = None,
                  end_ns: int | None = None) -> Iterator[BagMessage]:
         """

@@ -88,7 +88,7 @@ def recover(path: Path, progress: Callable[[float], object] | None = None) -> Re
                              'free some space; the recording is as it was') from error
     with BagReader(path) as reader:
         return RecoverReport(
-            path, reader.message_count, (reader.end_ns - reader.start_ns) / 1e9,
+            path, reader.message_count, reader.duration_s,
             sum(count or 0 for count in dropped.values()),
             tuple(name for name, count in dropped.items() if count is not None), written)
 
@@ -101,7 +101,7 @@ def _recover_other(path: Path) -> RecoverReport:
         _describe_databases(path, files)
     with BagReader(path) as reader:
         return RecoverReport(path, reader.message_count,
-                             (reader.end_ns - reader.start_ns) / 1e9, 0, (), written)
+                             reader.duration_s, 0, (), written)
 
 
 def _is_described(folder: Path, files: list[Path]) -> bool:

@@ -11,13 +11,13 @@ from crgame_ros.errors import InputError
 from crgame_ros.messages.cdr import aligned, LITTLE_ENDIAN
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.standard_messages import TABLE
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS, CycleTable
 import numpy as np
 from numpy.typing import NDArray
 
 CYCLE_TOPIC = '/timing/cycle'
 _FEW_CYCLES = 10
-_ARRAY = 'std_msgs/msg/Float64MultiArray'
 
 FloatArray = NDArray[np.float64]
 
@@ -52,8 +52,7 @@ def read_cycles(bag: Path | BagReader, epoch: int | None = None) -> CycleTable:
 
 def cycle_tables(reader: BagReader) -> list[CycleTable]:
     """Read the cycles of all runs, in blocks of one epoch."""
-    found = reader.topics.get(CYCLE_TOPIC)
-    if found is None or found.type_name != _ARRAY or not found.message_count:
+    if not reader.holds(CYCLE_TOPIC, TABLE):
         raise InputError(f'no {CYCLE_TOPIC} in it', str(reader.path), 'record this topic too')
     return [table for table in _readable_tables(reader) if len(table.rows)]
 

@@ -69,8 +69,7 @@ def seat_orders(reader: BagReader, run: Epoch) -> tuple[SeatOrder, ...]:
 
     :raises InputError: if the recording cannot be read.
     """
-    topic = reader.topics.get(ORDER.topic)
-    if topic is None or not topic.message_count:
+    if not reader.holds(ORDER.topic):
         return ()
     found: list[SeatOrder] = []
     newest: int | None = None

@@ -45,12 +45,13 @@ def test_everything_is_described(tmp_path: Path, samples: Any) -> None:
     assert (info.storage, info.complete, info.message_count) == ('mcap', True, 203)
     assert (info.start_ns, info.end_ns, info.duration_s) == (2_000_000_000, 4_020_000_000, 2.02)
     assert info.size_bytes == (folder / 'run_0.mcap').stat().st_size
-    rates = {entry.topic.name: entry.rate_hz for entry in info.topics}
+    rates = {topic.name: info.rate_hz(topic) for topic in info.topics}
     assert rates['/a'] == pytest.approx(199 / 2.02)
     assert rates['/scenario/game'] is None
     assert info.game is not None and info.game.benchmark_id == 'ZAM_CutIn-1_1_T-1'
-    assert info.game.humans == (('hv0', 'keys:cut_in.yaml'),)
-    assert info.game.avs == (('av0', 'idm'), ('av1', 'reactive'))
+    assert [(item.id, item.driver) for item in info.game.humans] == [('hv0', 'keys:cut_in.yaml')]
+    assert [(item.id, item.planner) for item in info.game.avs] == [
+        ('av0', 'idm'), ('av1', 'reactive')]
     assert info.cycles is not None and (info.cycles.recorded, info.cycles.missing) == (3, 0)
 
 
