@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finishes the recording of a killed recorder, without risk to its messages."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from io import BytesIO
@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 from crgame_ros.errors import InputError
 from crgame_ros.recording.exceptions import RecordingError
-from crgame_ros.recording.mcap_file import McapFile, McapMessage
+from crgame_ros.recording.mcap_file import McapFile
 from crgame_ros.recording.metadata import (
     BagFile,
     BagMetadata,
@@ -75,14 +75,19 @@ def recover(path: Path, progress: Callable[[float], object] | None = None) -> Re
     if not path.exists():
         raise InputError('no such file or folder', str(path), 'give a recording')
     files = [path] if path.is_file() else sorted(path.glob('*.mcap'))
-    if not files or files[0].suffix != '.mcap':
-        return _recover_other(path)
+    dropped: dict[str, int | None] = {}
     try:
-        dropped = {file.name: _finish(file, progress) for file in files}
-        written = path.is_dir() and not _has_metadata(path, files, any(
-            count is not None for count in dropped.values()))
-        if written:
-            _describe(path, files)
+        if files and files[0].suffix == '.mcap':
+            dropped = {file.name: _finish(file, progress) for file in files}
+            rewritten = any(count is not None for count in dropped.values())
+            written = path.is_dir() and (rewritten or not _has_metadata(path, files))
+            if written:
+                _describe(path, 'mcap', files, [McapStorage([file]) for file in files])
+        else:
+            files = sorted(path.glob('*.db3')) if path.is_dir() else []
+            written = bool(files) and not _is_described(path, files)
+            if written:
+                _describe(path, 'sqlite3', files, [_opened_database(file) for file in files])
     except OSError as error:
         raise RecordingError(path, f'cannot be finished: {error.strerror}',
                              'free some space; the recording is as it was') from error
@@ -93,20 +98,9 @@ def recover(path: Path, progress: Callable[[float], object] | None = None) -> Re
             tuple(name for name, count in dropped.items() if count is not None), written)
 
 
-def _recover_other(path: Path) -> RecoverReport:
-    """Write the metadata of SQLite files, unless they have it."""
-    files = sorted(path.glob('*.db3')) if path.is_dir() else []
-    written = bool(files) and not _is_described(path, files)
-    if written:
-        _describe_databases(path, files)
-    with BagReader(path) as reader:
-        return RecoverReport(path, reader.message_count,
-                             reader.duration_s, 0, (), written)
-
-
 def _is_described(folder: Path, files: list[Path]) -> bool:
     """Return whether SQLite files have metadata with which they can be read."""
-    if not _has_metadata(folder, files, False):
+    if not _has_metadata(folder, files):
         return False
     try:
         with BagReader(folder):
@@ -115,25 +109,27 @@ def _is_described(folder: Path, files: list[Path]) -> bool:
         return False
 
 
-def _describe_databases(folder: Path, files: list[Path]) -> None:
+def _opened_database(file: Path) -> RosbagsStorage:
     """
-    Write `metadata.yaml` for SQLite files.
+    Open an SQLite file.
 
-    :raises InputError: if a file is damaged.
-    :raises RecordingError: if the disk refuses.
+    :raises InputError: if it is damaged.
     """
-    storages = []
-    for file in files:
-        try:
-            # Opening rolls back unfinished transactions; readers open without this check.
-            with closing(sqlite3.connect(file)) as connection:
-                (state,), *_ = connection.execute('PRAGMA quick_check(1)').fetchall()
-        except sqlite3.Error as error:
-            state = str(error)
-        if state != 'ok':
-            raise InputError(f'the database is damaged ({state})', str(file),
-                             f'save what is left with `sqlite3 {file.name} .recover`')
-        storages.append(RosbagsStorage(file))
+    try:
+        # Opening rolls back unfinished transactions; readers open without this check.
+        with closing(sqlite3.connect(file)) as connection:
+            (state,), *_ = connection.execute('PRAGMA quick_check(1)').fetchall()
+    except sqlite3.Error as error:
+        state = str(error)
+    if state != 'ok':
+        raise InputError(f'the database is damaged ({state})', str(file),
+                         f'save what is left with `sqlite3 {file.name} .recover`')
+    return RosbagsStorage(file)
+
+
+def _describe(folder: Path, kind: str, files: Sequence[Path],
+              storages: Sequence[McapStorage | RosbagsStorage]) -> None:
+    """Write the `metadata.yaml` of files, each opened as a storage of its own; close these."""
     entries = [BagFile(file.name, storage.start_ns, storage.end_ns,
                        sum(topic.message_count for topic in storage.topics))
                for file, storage in zip(files, storages, strict=True)]
@@ -141,11 +137,7 @@ def _describe_databases(folder: Path, files: list[Path]) -> None:
     for storage in storages:
         storage.close()
     entries.sort(key=lambda entry: entry.start_ns)
-    try:
-        write_metadata(folder, BagMetadata('sqlite3', tuple(entries), topics))
-    except OSError as error:
-        raise RecordingError(folder, f'cannot be finished: {error.strerror}',
-                             'free some space; the recording is as it was') from error
+    write_metadata(folder, BagMetadata(kind, tuple(entries), topics))
 
 
 def _finish(path: Path, progress: Callable[[float], object] | None) -> int | None:
@@ -182,7 +174,8 @@ def _copy(source: McapFile, target: BinaryIO,
                 continue
             if message.channel_id not in channels:
                 _register(source, message.channel_id, writer, schemas, channels)
-            _write(writer, channels[message.channel_id], message)
+            writer.add_message(channels[message.channel_id], message.log_time_ns, message.data,
+                               message.publish_time_ns, message.sequence)
             count += 1
     for number in sorted(source.channels.keys() - channels.keys()):
         _register(source, number, writer, schemas, channels)
@@ -203,11 +196,6 @@ def _register(source: McapFile, number: int, writer: Writer, schemas: dict[int, 
         channel.metadata)
 
 
-def _write(writer: Writer, channel: int, message: McapMessage) -> None:
-    writer.add_message(channel, message.log_time_ns, message.data, message.publish_time_ns,
-                       message.sequence)
-
-
 def _copy_record(path: Path, offset: int, size: int, writer: Writer) -> None:
     with path.open('rb') as stream:
         stream.seek(offset)
@@ -222,9 +210,9 @@ def _copy_record(path: Path, offset: int, size: int, writer: Writer) -> None:
                               attachment.media_type, attachment.data)
 
 
-def _has_metadata(folder: Path, files: list[Path], rewritten: bool) -> bool:
+def _has_metadata(folder: Path, files: list[Path]) -> bool:
     """Return whether `metadata.yaml` exists and describes the present files."""
-    if rewritten or not (folder / METADATA_FILE).is_file():
+    if not (folder / METADATA_FILE).is_file():
         return False
     try:
         listed = {file.name for file in read_metadata(folder).files}
@@ -232,13 +220,3 @@ def _has_metadata(folder: Path, files: list[Path], rewritten: bool) -> bool:
         # Unreadable metadata is one kind of damage that is repaired here.
         return False
     return listed == {file.name for file in files}
-
-
-def _describe(folder: Path, files: list[Path]) -> None:
-    entries = []
-    for file in files:
-        tally = McapFile(file).tally()
-        entries.append(BagFile(file.name, tally.start_ns, tally.end_ns,
-                               sum(tally.counts.values())))
-    entries.sort(key=lambda entry: entry.start_ns)
-    write_metadata(folder, BagMetadata('mcap', tuple(entries), McapStorage(files).topics))
