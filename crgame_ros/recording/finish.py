@@ -5,7 +5,7 @@
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.conversion import convert_log, read_last_run
@@ -19,6 +19,7 @@ from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, parts_of
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.recording.timing_report import write_timing_report
 
+T = TypeVar('T')
 # Exit codes.
 OK, FAILED, EMPTY = 0, 1, 3
 _NOTHING = 'nothing was recorded: the run ended before its first step'
@@ -52,14 +53,15 @@ def finish_run(folder: Path, say: Callable[[str], object], progress: bool = True
     :return: OK, FAILED if something could not be written, EMPTY if nothing was recorded.
     """
     code = OK
-    tell = say if progress else _discard
+    tell: Callable[[str], object] = say if progress else lambda _: None
     bags = bags_of(folder)
     # A restarted recorder continued in another folder.
     runs = [bag for bag in bags if not any(bag in parts_of(other)[1:] for other in bags)]
     for bag in bags:
-        failed = _attempt(partial(recover, bag, Progress(tell, f'finishing {bag}')), say)
+        report = _attempt(partial(recover, bag, Progress(tell, f'finishing {bag}')), say)
         # A recorder killed right after its start leaves nothing; the rest is reported below.
-        code |= failed if len(parts_of(bag)) == 1 and bag in runs else OK
+        if report is None and len(parts_of(bag)) == 1 and bag in runs:
+            code = FAILED
     results = []
     for bag in runs:
         # The first recording's files are named after the run, later ones get a suffix.
@@ -79,10 +81,6 @@ def finish_run(folder: Path, say: Callable[[str], object], progress: bool = True
     return code
 
 
-def _discard(_line: str) -> None:
-    """Discard a progress line that is not shown."""
-
-
 def _derive(bag: Path, suffix: str, say: Callable[[str], object],
             tell: Callable[[str], object]) -> tuple[int, FinishedRecording | None]:
     """Write one recording's timing report and scenario, which agree on its steps."""
@@ -90,24 +88,21 @@ def _derive(bag: Path, suffix: str, say: Callable[[str], object],
     if not _has_cycles(bag):
         say(f'{folder}: {_NOTHING}')
         return EMPTY, None
-    logs: list[RunTrajectories] = []
     try:
-        reading = Progress(tell, f'reading {bag}')
-        code = _attempt(lambda: logs.append(read_last_run(bag, reading)), say)
+        log = _attempt(partial(read_last_run, bag, Progress(tell, f'reading {bag}')), say)
     except RunTooShortError as error:
         say(f'{folder}: {error.what}')
         return EMPTY, None
     # A run that cannot become a scenario still has its timing report.
-    log = logs[0] if logs else None
-    reports: list[RunReport] = []
-    timing = Progress(tell, f'reading the timing of {bag}')
-    code |= _attempt(lambda: reports.append(write_timing_report(
-        bag, folder / f'timing{suffix}.json', log=log, progress=timing)), say)
+    timing = _attempt(partial(
+        write_timing_report, bag, folder / f'timing{suffix}.json', log=log,
+        progress=Progress(tell, f'reading the timing of {bag}')), say)
     if log is None:
-        return code, None
+        return FAILED, None
     scenario = folder / f'{bag.name}.xml' if suffix else folder
-    code |= _attempt(partial(convert_log, log, bag, scenario), say)
-    return code, FinishedRecording(bag, suffix, log, reports[0] if reports else None)
+    converted = _attempt(partial(convert_log, log, bag, scenario), say)
+    code = FAILED if timing is None or converted is None else OK
+    return code, FinishedRecording(bag, suffix, log, timing)
 
 
 def _has_cycles(bag: Path) -> bool:
@@ -119,16 +114,15 @@ def _has_cycles(bag: Path) -> bool:
         return True
 
 
-def _attempt(step: Callable[[], object], say: Callable[[str], object]) -> int:
+def _attempt(step: Callable[[], T], say: Callable[[str], object]) -> T | None:
+    """Return the result of a step; None if it fails, with a line about it."""
     try:
-        step()
+        return step()
     except RunTooShortError:
         raise
     except (CrgameError, OSError) as error:
         say(f'error: {error}')
-        return FAILED
     except Exception as error:
         # One file that cannot be written must not prevent the others.
         say(f'error: {type(error).__name__}: {error}')
-        return FAILED
-    return OK
+    return None
