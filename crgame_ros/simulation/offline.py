@@ -19,7 +19,7 @@ from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.manager import FailureLines, planner_status, PlannerManager
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.simulation.autonomous_vehicle import AvCounters
-from crgame_ros.simulation.av_models import published_states
+from crgame_ros.simulation.av_models import published, published_states
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.observer import drivability_monitor, ObservedRun, RunObserver
 from crgame_ros.simulation.plan_requests import request_topic
@@ -27,7 +27,7 @@ from crgame_ros.simulation.run_messages import MessageLog, refusal_status, RunMe
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.driver_command import COMMAND_WIDTH, DriverCommand, RELEASED
-from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
+from crgame_ros.vehicle.state import STATE_WIDTH
 import numpy as np
 from numpy.typing import NDArray
 
@@ -119,7 +119,7 @@ class OfflineResult:
     commands: NDArray[np.float64]
     intervals_s: NDArray[np.float64]
     planners: Mapping[str, PlannerRecord]
-    violations: tuple[VehicleDrivability, ...] = field(default=())
+    violations: tuple[VehicleDrivability, ...] = ()
     fired: tuple[FiredEvent, ...] = ()
     stop: VehicleDrivability | None = None
     av_commands: NDArray[np.float64] = field(
@@ -138,11 +138,9 @@ def perception_of(setup: Setup, index: int) -> Perception | None:
     av = setup.avs[index]
     if av.spec.perception is None:
         return None
-    initial = published_states([av.state])[0]
     return Perception(
         av.id, av.spec.perception, setup.descriptions, av.vehicle, av.transform,
-        VehicleState(*initial.tolist()), setup.game.seed, setup.scheduler.dt_s,
-        setup.open_occupancy())
+        published(av.state), setup.game.seed, setup.scheduler.dt_s, setup.open_occupancy())
 
 
 class PlannerSeat:

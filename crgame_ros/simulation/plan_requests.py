@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
+from typing import NamedTuple
 
 from crgame_ros.game.events import PlannerSwap
 from crgame_ros.game.objects import ObjectStates
@@ -31,7 +32,7 @@ from numpy.typing import NDArray
 Poses = NDArray[np.float64]
 
 
-class Forecast:
+class Forecast(NamedTuple):
     """
     The present and predicted motion of all vehicles and objects at one tick.
 
@@ -43,12 +44,10 @@ class Forecast:
     :param object_velocities: (P, M, 3)
     """
 
-    def __init__(self, vehicle_poses: Poses, vehicle_velocities: Poses,
-                 object_poses: Poses, object_velocities: Poses) -> None:
-        self.vehicle_poses = vehicle_poses
-        self.vehicle_velocities = vehicle_velocities
-        self.object_poses = object_poses
-        self.object_velocities = object_velocities
+    vehicle_poses: Poses
+    vehicle_velocities: Poses
+    object_poses: Poses
+    object_velocities: Poses
 
 
 class PlanRequests:

@@ -129,7 +129,9 @@ class Setup:
 
     def make_scripted(self) -> ScriptedObjects | None:
         """Build the game's own objects in their states at the first tick."""
-        return _scripted(self.game, self.network, self.scheduler)
+        return ScriptedObjects(
+            self.game.objects, self.network, self.scheduler.time_step_s, self.scheduler.k0) \
+            if self.game.objects else None
 
     def open_occupancy(self) -> TiledOccupancy | None:
         """
@@ -190,14 +192,13 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     k0 = min((av.planning_problem.initial_state.time_step for av in avs), default=0)
     doubles = _recorded_egos(loaded, avs, k0)
     obstacles = ScenarioObstacles(loaded, doubles, held_obstacles(game), put_obstacles(game))
+    vehicles = [*(human.id for human in game.humans), *(av.id for av in avs)]
     check_events(game, loaded.source, network, obstacles, [human.id for human in game.humans],
                  [av.spec for av in avs])
-    check_tasks(game.tasks, game.events, loaded.source,
-                [*(human.id for human in game.humans), *(av.spec.id for av in avs)],
+    check_tasks(game.tasks, game.events, loaded.source, vehicles,
                 [*(item.id for item in obstacles.descriptions),
                  *(item.id for item in game.objects)])
-    _check_gaze(game, loaded.source,
-                [*(human.id for human in game.humans), *(av.spec.id for av in avs)])
+    _check_gaze(game, loaded.source, vehicles)
     notices = [*loaded.notices, *(f'{loaded.source}: {remark}' for remark in remarks),
                *_discrepancies(avs), *(
         f'{loaded.source}: obstacle {number} is the recorded {av_id} itself and is left out'
@@ -247,12 +248,6 @@ def _from_anywhere(driver: str, base: Path) -> str:
     if not driver.startswith(POLICY):
         return driver
     return POLICY + str((base / expanded(driver.removeprefix(POLICY))).resolve())
-
-
-def _scripted(game: Game, network: RoadNetwork,
-              scheduler: ScenarioScheduler) -> ScriptedObjects | None:
-    return ScriptedObjects(game.objects, network, scheduler.time_step_s, scheduler.k0) \
-        if game.objects else None
 
 
 def _with_living(setup: Setup) -> Setup:
