@@ -36,7 +36,7 @@ from crgame_ros.recording.standard_messages import (
 from crgame_ros.recording.writer import BagWriter
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.simulation.run_messages import stop_reason, stop_status
-from crgame_ros.simulation.run_texts import document_texts, state_text, state_values
+from crgame_ros.simulation.run_texts import describe_game, document_texts, state_text, state_values
 from crgame_ros.timing.cycle_rows import CycleRows, CYCLES
 from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.timing.time_controller import Cycle
@@ -190,7 +190,7 @@ class _OfflineMessages:
         return text_bytes(content)
 
     def _beginning(self) -> list[_Sent]:
-        texts = document_texts(self._setup)
+        texts = document_texts(self._setup, describe_game(self._setup))
         texts[RUN_STATE.topic] = state_text(state_values('running'))
         return [(topic, text_bytes(text)) for topic, text in texts.items()]
 

@@ -18,20 +18,17 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.steering import table_text
 
 
-def document_texts(setup: Setup, *, epoch: int = 0, clock_offset_ns: int = 0,
-                   real_time_factor: float = 1.0, simulation: str = '') -> dict[str, str]:
+def document_texts(setup: Setup, game: GameDocument) -> dict[str, str]:
     """
     Return the texts of the topics that describe a run before it begins: the game comes last.
 
-    Parameters are those of `describe_game`.
+    :param game: the resolved game, as `describe_game` returns it.
     """
     return {'/scenario/xml': setup.loaded.xml_text,
             OBJECTS.topic: OBJECTS.write(setup.descriptions),
-            EVENTS.topic: EVENTS.write(FiredEvents(epoch, ())),
-            TASK_STATE.topic: TASK_STATE.write(TaskState(epoch, (), ())),
-            GAME.topic: GAME.write(describe_game(
-                setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
-                real_time_factor=real_time_factor, simulation=simulation))}
+            EVENTS.topic: EVENTS.write(FiredEvents(game.epoch, ())),
+            TASK_STATE.topic: TASK_STATE.write(TaskState(game.epoch, (), ())),
+            GAME.topic: GAME.write(game)}
 
 
 def state_values(state: str, reason: str = '', *, real_time_factor: float = 1.0,

@@ -21,7 +21,7 @@ from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import EXACT_VARIANCE, SeriesMessage, set_time, StateMessage
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.plan_requests import request_topic
-from crgame_ros.simulation.run_texts import document_texts, SignalTexts, state_text
+from crgame_ros.simulation.run_texts import describe_game, document_texts, SignalTexts, state_text
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.cycle_rows import CycleRows, CYCLES
 from crgame_ros.timing.publishing import steps_between_messages
@@ -138,9 +138,9 @@ class SimOutputs:
         :param simulation: name of this process.
         """
         self._simulation, self._epoch = simulation, epoch
-        for name, text in document_texts(
-                self._setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
-                real_time_factor=factor, simulation=simulation).items():
+        game = describe_game(self._setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
+                             real_time_factor=factor, simulation=simulation)
+        for name, text in document_texts(self._setup, game).items():
             self.tell(name, text)
 
     def tell(self, topic: str, text: str) -> None:
