@@ -22,6 +22,7 @@ from crgame_ros.messages.request_layout import request_head
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.storage import BagMessage
+from crgame_ros.simulation.autonomous_vehicle import PLAN_COUNTS
 from crgame_ros.simulation.contacts import ContactEntry
 from crgame_ros.simulation.offline import OfflineResult, PlannerRecord
 from crgame_ros.vehicle.state import VehicleState
@@ -43,9 +44,6 @@ RunReport = TypedDict('RunReport', {  # noqa: UP013
     'real_time_ratio': dict[str, float], 'late_steps': Mapping[str, object] | None,
     'sound': Mapping[str, Mapping[str, Any]], 'view': Mapping[str, Sequence[Mapping[str, Any]]],
 }, total=False)
-# The engine's counts in a status `sim_node: <av> plans`.
-PLAN_COUNTS = ('requests', 'accepted', 'refused', 'of_others', 'skipped', 'timed_out', 'realigned',
-               'steps_without_plan')
 
 
 class RecordedPlan(NamedTuple):

@@ -20,7 +20,6 @@ from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recorded_plans import (
     OpenRequests,
-    PLAN_COUNTS,
     PlanOutcome,
     plans_of_result,
     RunReport,
@@ -32,6 +31,7 @@ from crgame_ros.recording.run_points import read_points
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.recording.storage import BagMessage
 from crgame_ros.recording.views import SeatSound, ViewPeriods
+from crgame_ros.simulation.autonomous_vehicle import PLAN_COUNTS
 from crgame_ros.simulation.contacts import (
     Contact,
     ContactEntry,

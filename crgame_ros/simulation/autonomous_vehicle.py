@@ -106,6 +106,11 @@ class AvCounters:
     last_latency_steps: int = 0
 
 
+# Its counts, as a status and `timing.json` tell them.
+PLAN_COUNTS = ('requests', 'accepted', 'refused', 'of_others', 'skipped', 'timed_out', 'realigned',
+               'steps_without_plan')
+
+
 @dataclass
 class _Asked:
     """The true state of an AV at a request, and the state told to its planner; None: not known."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from crgame_ros.game.task_documents import TASK_STATE, TaskState
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.messages.status_values import ERROR, OK, Status, WARN
-from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
+from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle, PLAN_COUNTS
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.run_texts import SignalTexts
 from crgame_ros.timing.publishing import steps_between_messages
@@ -90,11 +90,7 @@ def plans_status(av: AutonomousVehicle, n: int, dt_s: float) -> Status:
         f'sim_node: {av.setup.id} plans', ERROR if stale else OK,
         'no plan: braking' if stale else 'following its plan',
         {'planner': av.setup.spec.planner, 'running': av.planner_running,
-         'requests': counters.requests, 'accepted': counters.accepted,
-         'refused': counters.refused, 'of_others': counters.of_others,
-         'skipped': counters.skipped,
-         'timed_out': counters.timed_out, 'realigned': counters.realigned,
-         'steps_without_plan': counters.steps_without_plan,
+         **{name: getattr(counters, name) for name in PLAN_COUNTS},
          'latency_ms': round(counters.last_latency_steps * dt_s * 1e3, 3),
          'age_ms': '' if age is None else round(age * dt_s * 1e3, 3),
          'last_refusal': counters.last_refusal, **_tracking(av)})
