@@ -23,7 +23,12 @@ from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.export import write_scenario
 from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.reproduction.expectation import Judgement
-from crgame_ros.reproduction.recorded_human import record_live, record_offline, RecordedHuman
+from crgame_ros.reproduction.recorded_human import (
+    read_recorded,
+    record_offline,
+    RecordedHuman,
+    run_live,
+)
 from crgame_ros.reproduction.single_av_evaluation import (
     Encounter,
     judge_multi_av,
@@ -148,7 +153,8 @@ class EvaluationRequest:
             self.say(f'recording {game.stem} offline …')
             return record_offline(game, self.idm)
         self.say(f'recording {game.stem} live, which takes as long as the game …')
-        return record_live(game, self.idm, self.runs / game.stem)
+        run_live(game, self.idm, self.runs / game.stem)
+        return read_recorded(game.stem, self.idm, self.runs / game.stem)
 
     def repeat(self, recorded: RecordedHuman, planner: str) -> Alternative:
         """Drive the recorded human against a planner."""

@@ -70,20 +70,6 @@ def record_offline(game: Path, planner: str, duration_s: float | None = None) ->
     return RecordedHuman(game.stem, trajectories_of(result), setup_for, inputs_of(result))
 
 
-def record_live(game: Path, planner: str, folder: Path,
-                duration_s: float | None = None) -> RecordedHuman:
-    """
-    Run a game with its scripted driver in real time, without the page, and read its recording.
-
-    :param folder: folder of the run; must not exist.
-    :param duration_s: None for the game's own [s]
-    :raises InputError: if game, planner or folder cannot be used.
-    :raises CrgameError: if the run failed.
-    """
-    run_live(game, planner, folder, duration_s)
-    return read_recorded(game.stem, planner, folder)
-
-
 def read_recorded(name: str, planner: str, folder: Path) -> RecordedHuman:
     """
     Read a live run.
@@ -104,8 +90,11 @@ def read_recorded(name: str, planner: str, folder: Path) -> RecordedHuman:
 
 def run_live(game: Path, planner: str, folder: Path, duration_s: float | None = None) -> None:
     """
-    Run a game live, without the page, as `record_live` does.
+    Run a game with its scripted driver in real time, without the page.
 
+    :param folder: folder of the run; must not exist.
+    :param duration_s: None for the game's own [s]
+    :raises InputError: if game, planner or folder cannot be used.
     :raises CrgameError: if the run failed; its messages are on the terminal.
     """
     # Checked before any process starts, so that an error is reported in one line.

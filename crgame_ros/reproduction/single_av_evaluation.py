@@ -36,8 +36,8 @@ REACTS = 1.0
 JUMP = 0.05
 # Length to which the lane is followed [m]: longer than any game.
 _ALONG = 2000.0
-# A vehicle stands below this speed [m/s], and has passed another with this lead [m].
-_STANDING, _PASSED = 0.1, 8.0
+# A vehicle has passed another with this lead [m].
+_PASSED = 8.0
 
 
 class DrivenLane:
@@ -115,7 +115,7 @@ class Encounter:
         inside = np.abs(self.lane.across[:, 0]) < 0.5 * self.lane.width
         begin = int(np.argmax(inside))
         lead = self.lane.along[:, self._place] - self.lane.along[:, 0]
-        answered = (self.speeds < _STANDING) | (lead > _PASSED)
+        answered = (self.speeds < STANDING) | (lead > _PASSED)
         answered[:begin] = False
         return begin, int(np.argmax(answered)) if answered.any() else len(answered) - 1
 

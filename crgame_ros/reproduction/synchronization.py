@@ -9,7 +9,6 @@ import json
 import os
 from pathlib import Path
 import time
-from typing import TypeVar
 
 from crgame_ros.analysis.pictures.timing_figure import TimedRun
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS, TimingTable
@@ -129,7 +128,6 @@ PAPER_TABLE = {
 
 # Beside other programs that use more of the machine, the loops cannot be compared [-].
 MOST_OTHERS = 0.1
-Result = TypeVar('Result')
 
 
 @dataclass(frozen=True)
@@ -183,29 +181,29 @@ def measure_synchronization(game: Path, planner: str, duration_s: float,
     :param folder: folder of both runs' files, with subfolders `proposed` and `naive`.
     :raises CrgameError: if a run failed.
     """
-    _, beside_proposed = others_beside(
+    beside_proposed = others_beside(
         lambda: run_live(game, planner, folder / 'proposed', duration_s))
     proposed = Run.of_recording(folder / 'proposed', name=PROPOSED).timed
     setup = effective_setup(RunRequest(game=game, planners=(planner,)))
     loop = NaiveLoop(setup, folder / 'naive')
-    _, beside_naive = others_beside(lambda: loop.run(duration_s))
+    beside_naive = others_beside(lambda: loop.run(duration_s))
     loop.close()
     return Synchronization(proposed, TimedRun(NAIVE, loop.cycles, setup.scheduler.dt_s),
                            (beside_proposed, beside_naive))
 
 
-def others_beside(work: Callable[[], Result]) -> tuple[Result, float]:
+def others_beside(work: Callable[[], object]) -> float:
     """
     Do some work, and measure what other programs use meanwhile.
 
-    :return: the work's result, and the share of the machine's processor time that neither this
-        process nor its ended children used [-]
+    :return: the share of the machine's processor time that neither this process nor its ended
+        children used [-]
     """
     begin_s, busy_s, own_s = time.monotonic(), _busy_s(), sum(os.times()[:4])
-    result = work()
+    work()
     others_s = _busy_s() - busy_s - (sum(os.times()[:4]) - own_s)
     whole_s = (time.monotonic() - begin_s) * (os.cpu_count() or 1)
-    return result, max(0.0, others_s) / whole_s
+    return max(0.0, others_s) / whole_s
 
 
 def _busy_s() -> float:
