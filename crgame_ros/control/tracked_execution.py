@@ -44,6 +44,8 @@ class TrackedExecution:
     :param tracker: the controller, used by this vehicle alone
     :param model: the vehicle's motion model, also used by it alone
     :param dt_s: simulation step [s]
+    :ivar errors: at the end of the last step; None if it followed no plan.
+    :ivar worst: the largest absolute errors of the run.
     """
 
     def __init__(self, vehicle: VehicleParameters, tracker: Tracker, model: VehicleModel,
@@ -52,8 +54,7 @@ class TrackedExecution:
         self.tracker = tracker
         self.model = model
         self.dt_s = dt_s
-        self._errors: TrackingErrors | None = None
-        self._worst = [0.0, 0.0, 0.0, 0.0]
+        self.worst = TrackingErrors(0.0, 0.0, 0.0, 0.0)
         self._forget()
 
     def reset(self, state: VehicleState) -> None:
@@ -79,7 +80,7 @@ class TrackedExecution:
         :return: the true state a step later
         """
         if reference is None or reference.used_up:
-            self._errors = None
+            self.errors = None
             self._plans.clear()
             return self._moved(state, self._braking(state))
         if state.speed == 0.0:
@@ -90,18 +91,8 @@ class TrackedExecution:
         self._measure(moved)
         return moved
 
-    @property
-    def errors(self) -> TrackingErrors | None:
-        """Return the errors at the end of the last step; None if it followed no plan."""
-        return self._errors
-
-    @property
-    def worst(self) -> TrackingErrors:
-        """Return the largest absolute errors of the run."""
-        return TrackingErrors(*self._worst)
-
     def _forget(self) -> None:
-        self._errors = None
+        self.errors: TrackingErrors | None = None
         # Plans with the time since the first state of each, the oldest first.
         self._plans: deque[tuple[PlannedTrack, float]] = deque()
 
@@ -137,6 +128,6 @@ class TrackedExecution:
         dx, dy = state.x - planned.x, state.y - planned.y
         errors = TrackingErrors(dy * c - dx * s, dx * c + dy * s,
                                 wrap_pi(state.yaw - planned.yaw), state.speed - planned.speed)
-        self._errors = errors
-        for i, error in enumerate(errors):
-            self._worst[i] = max(self._worst[i], abs(error))
+        self.errors = errors
+        self.worst = TrackingErrors(*(
+            max(worst, abs(error)) for worst, error in zip(self.worst, errors, strict=True)))
