@@ -5,19 +5,20 @@
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-import math
 from pathlib import Path
 import re
 import statistics
 from typing import NamedTuple
 
+from crgame_ros.game.documents import VEHICLE_ID
 from crgame_ros.game.view_documents import VIEW_PICTURE, ViewEye, ViewPicture, ViewPlace
 from crgame_ros.messages.status_values import Status, status_amount, status_truth
 from crgame_ros.recording.reader import BagReader
 import numpy as np
 from numpy.typing import NDArray
 
-_SOUND_NAME = re.compile(r'cockpit_node: ((?:hv|av)[0-9]{1,3}) sound')
+_SOUND_NAME, _VIEW_NAME = (
+    re.compile(f'cockpit_node: ({VEHICLE_ID.pattern}) {what}') for what in ('sound', 'view'))
 FloatArray = NDArray[np.float64]
 
 
@@ -30,12 +31,10 @@ class SeatSound:
     def add(self, status: Status) -> None:
         """Process a status; ignore other statuses and those without shares."""
         found = _SOUND_NAME.fullmatch(status.name)
-        if found is None:
-            return
-        values = status.values
-        volume, rumble = _share(values, 'volume'), _share(values, 'rumble')
-        if volume is not None and rumble is not None:
-            told = (status_truth(values, 'on'), volume, rumble)
+        volume, rumble = (status_amount(status.values, name) for name in ('volume', 'rumble'))
+        if found is not None and volume is not None and rumble is not None \
+                and max(volume, rumble) <= 1.0:
+            told = (status_truth(status.values, 'on'), volume, rumble)
             self._told.setdefault(found[1], []).append(told)
 
     def as_dict(self) -> Mapping[str, Mapping[str, object]]:
@@ -54,15 +53,6 @@ class SeatSound:
         return summary
 
 
-def _share(values: Mapping[str, str], name: str) -> float | None:
-    try:
-        share = float(values.get(name, ''))
-    except ValueError:
-        return None
-    return share if math.isfinite(share) and 0.0 <= share <= 1.0 else None
-
-
-_NAME = re.compile(r'cockpit_node: ((?:hv|av)[0-9]{1,3}) view')
 _SHOWN = ('map', 'driver', 'chase', 'bird')
 _FLAGS = ('inset', 'plans', 'mirrors', 'bare', 'software')
 _MEASURES = ('across_deg', 'screen_width_m', 'eye_distance_m', 'width_px', 'height_px')
@@ -88,7 +78,7 @@ class ViewPeriods:
 
         :param time_s: of the run's clock [s]
         """
-        found = _NAME.fullmatch(status.name)
+        found = _VIEW_NAME.fullmatch(status.name)
         values = status.values
         if found is None or values.get('shown') not in _SHOWN:
             return
