@@ -93,7 +93,8 @@ class PutBack:
         """Return the places on the lane with the room that each needs, best first."""
         if index in self._tried and self._tried[index][0] == now[:3]:
             return self._tried[index][1]
-        return ((place, self._room(index, place)) for place in self._places(index, now))
+        return ((place, self._footprint(index, place, ROOM_AHEAD))
+                for place in self._places(index, now))
 
     def _places(self, index: int, now: VehicleState) -> Iterator[Place]:
         """Yield poses of the rear axle on the lane, in simulation coordinates, best first."""
@@ -132,9 +133,6 @@ class PutBack:
         shape = Shape.rectangle(vehicle.shape.length + ahead, vehicle.shape.width)
         x, y = VehicleState(*pose, 0.0).center(vehicle.rear_to_center + 0.5 * ahead)
         return placed_polygon(shape, x, y, pose[2])
-
-    def _room(self, index: int, place: Place) -> shapely.Polygon:
-        return self._footprint(index, place, ROOM_AHEAD)
 
     def _taken(self, index: int, since_tick_s: float, states: Sequence[VehicleState],
                objects: ObjectStates) -> list[shapely.Geometry]:
