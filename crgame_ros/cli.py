@@ -260,8 +260,8 @@ def _convert(values: argparse.Namespace) -> int:
         path, notices = convert_to_openscenario(values.bag, values.out, values.epoch, progress,
                                                 values.road)
     else:
-        report = convert(values.bag, values.out, values.epoch, progress)
-        path, notices = report.path, report.notices
+        path, exported = convert(values.bag, values.out, values.epoch, progress)
+        notices = exported.notices
     for notice in notices:
         print(f'note: {notice}')
     print(path)

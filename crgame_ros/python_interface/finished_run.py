@@ -14,6 +14,7 @@ from crgame_ros.analysis.runs.run import Run as MeasuredRun
 from crgame_ros.python_interface.games import as_path, FileName
 from crgame_ros.recording.recorded_game import RecordedInputs
 from crgame_ros.recording.recorded_plans import ViolationEntry
+from crgame_ros.recording.run_formats import OPENSCENARIO
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
@@ -147,9 +148,15 @@ class Run(MeasuredRun):
         warn_of(notices)
         return file
 
-    @abstractmethod
     def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
         """Write the scenario; return its file, and the parts that it does not express."""
+        from crgame_ros.recording.conversion import day_of, write_openscenario
+        from crgame_ros.recording.export import write_scenario
+        day = None if self.bag is None else day_of(self.bag)
+        if out.suffix == OPENSCENARIO:
+            return write_openscenario(self.log, out, day=day)
+        path, found = write_scenario(self.log, out, day=day)
+        return path, found.notices
 
     def __repr__(self) -> str:
         who = ', '.join((*(item.id for item in self.game.humans),

@@ -22,8 +22,6 @@ from crgame_ros.python_interface.games import (
     name_planners,
     PlannerLike,
 )
-from crgame_ros.recording.conversion import write_openscenario
-from crgame_ros.recording.export import scenario_path, write_scenario
 from crgame_ros.recording.offline_recording import check_run_folder, write_recording
 from crgame_ros.recording.progress import Progress
 from crgame_ros.recording.recorded_game import (
@@ -33,7 +31,6 @@ from crgame_ros.recording.recorded_game import (
     with_recorded_events,
 )
 from crgame_ros.recording.run_folder import GAME_FILE
-from crgame_ros.recording.run_formats import OPENSCENARIO
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import Setup
@@ -130,13 +127,6 @@ class OfflineRun(Run):
         write_recording(self.result, place)
         write_text(self.result.setup.game.dump(), place / GAME_FILE)
         return place
-
-    def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
-        """Write the scenario; return its file, and the parts that it does not express."""
-        if out.suffix == OPENSCENARIO:
-            return write_openscenario(self.log, out)
-        found = write_scenario(self.log, out)
-        return scenario_path(out, found.benchmark_id), found.notices
 
 
 def run(game: Game | FileName | None = None, *,

@@ -23,10 +23,8 @@ from crgame_ros.python_interface.games import (
     PlannerLike,
 )
 from crgame_ros.python_interface.offline_runs import OfflineRun
-from crgame_ros.recording.conversion import convert_log, day_of, write_openscenario
 from crgame_ros.recording.recorded_game import read_game_document
 from crgame_ros.recording.run_folder import recording_in, run_name
-from crgame_ros.recording.run_formats import OPENSCENARIO
 from crgame_ros.recording.run_points import recorded_states
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
 from crgame_ros.simulation.setup import Setup
@@ -67,13 +65,6 @@ class RecordedRun(Run):
     def recorded_traces(self) -> Mapping[str, NDArray[np.float64]]:
         """Return the states (N, 8) of its vehicles at the simulation steps from 0 on."""
         return recorded_states(self._bag, self.game.epoch)
-
-    def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
-        """Write the scenario; return its file, and the parts that it does not express."""
-        if out.suffix == OPENSCENARIO:
-            return write_openscenario(self.log, out, day=day_of(self._bag))
-        found = convert_log(self.log, self._bag, out)
-        return found.path, found.notices
 
 
 def read_run(path: FileName, epoch: int | None = None) -> RecordedRun:

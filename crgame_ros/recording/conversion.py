@@ -3,7 +3,7 @@
 """Converts a recording to a file of another format: CommonRoad or OpenSCENARIO."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import date, datetime, UTC
 import os
 from pathlib import Path
@@ -11,7 +11,7 @@ from pathlib import Path
 from crgame_ros.errors import InputError
 from crgame_ros.recording.epochs import epoch_numbers, XML_TOPIC
 from crgame_ros.recording.exceptions import RunTooShortError
-from crgame_ros.recording.export import export_scenario, scenario_path
+from crgame_ros.recording.export import ExportedScenario, scenario_path, write_scenario
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_formats import OPENSCENARIO, require_openscenario
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
@@ -19,31 +19,8 @@ from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.whole_file import write_text
 
 
-@dataclass(frozen=True)
-class ConversionReport:
-    """
-    The result of a conversion.
-
-    :param path: the scenario file.
-    :param benchmark_id: its benchmark id.
-    :param first_k: scenario step of the original that is its time step 0.
-    :param time_steps: number of its time steps.
-    :param obstacle_ids: CommonRoad ids of the vehicles and objects in it, by their names.
-    :param problem_ids: ids of the planning problems, by vehicle.
-    :param notices: the refused, omitted or repaired parts, one line each.
-    """
-
-    path: Path
-    benchmark_id: str
-    first_k: int
-    time_steps: int
-    obstacle_ids: dict[str, int]
-    problem_ids: dict[str, int]
-    notices: tuple[str, ...]
-
-
 def convert(bag: Path, out: Path | None = None, epoch: int | None = None,
-            progress: Callable[[float], object] | None = None) -> ConversionReport:
+            progress: Callable[[float], object] | None = None) -> tuple[Path, ExportedScenario]:
     """
     Write the scenario of a recorded run.
 
@@ -52,6 +29,7 @@ def convert(bag: Path, out: Path | None = None, epoch: int | None = None,
         recording.
     :param epoch: which run, where the recording holds several; None for the last that began.
     :param progress: as for `read_trajectories`.
+    :return: the file, and what is in it; its notices also name what is missing of the run.
     :raises RunTooShortError: if the run ended before its second scenario step.
     :raises InputError: if there is no run in it, or a file that is no export has the name.
     :raises CrgameError: if the result violates the schema; nothing is written then.
@@ -61,17 +39,14 @@ def convert(bag: Path, out: Path | None = None, epoch: int | None = None,
     return convert_log(log, bag, out)
 
 
-def convert_log(log: RunTrajectories, bag: Path, out: Path | None = None) -> ConversionReport:
+def convert_log(log: RunTrajectories, bag: Path,
+                out: Path | None = None) -> tuple[Path, ExportedScenario]:
     """
     Write the scenario of a run that has been read; parameters and errors as for `convert`.
 
     :param log: the run.
     """
-    exported = export_scenario(log, day=day_of(bag))
-    path = scenario_path(bag.resolve().parent if out is None else out, exported.benchmark_id)
-    write_text(exported.xml_text, path)
-    return ConversionReport(path, exported.benchmark_id, int(log.ks[0]), len(log.ks),
-                            exported.obstacle_ids, exported.problem_ids, exported.notices)
+    return write_scenario(log, bag.resolve().parent if out is None else out, day=day_of(bag))
 
 
 def convert_to_openscenario(bag: Path, out: Path | None = None, epoch: int | None = None,

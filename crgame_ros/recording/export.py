@@ -160,6 +160,8 @@ class ExportedScenario:
     :param obstacle_ids: CommonRoad ids of the objects and vehicles in it, by their names.
     :param problem_ids: ids of the planning problems, by vehicle or recorded human; without
         either, by `problem` and number.
+    :param first_k: scenario step of the original that is its time step 0.
+    :param time_steps: number of its time steps.
     :param notices: the parts that it could not express, one line each.
     """
 
@@ -167,6 +169,8 @@ class ExportedScenario:
     xml_text: str
     obstacle_ids: dict[str, int]
     problem_ids: dict[str, int]
+    first_k: int
+    time_steps: int
     notices: tuple[str, ...]
 
 
@@ -212,21 +216,24 @@ def export_scenario(log: RunTrajectories, *, author: str | None = None,
     header['source'] = f'{earlier}; {remark}' if earlier else remark
     text = scenario_document(header, roads.elements, objects.text() + problems)
     return ExportedScenario(header['benchmarkID'], text, objects.ids, writer.ids,
-                            tuple(map(one_line, notices)))
+                            shift, len(log.ks), tuple(map(one_line, notices)))
 
 
-def write_scenario(log: RunTrajectories, out: Path, **header: Any) -> ExportedScenario:
+def write_scenario(log: RunTrajectories, out: Path,
+                   **header: Any) -> tuple[Path, ExportedScenario]:
     """
     Write a run as a CommonRoad scenario, completely or not at all.
 
     :param out: the file (`*.xml`), or the folder for `<benchmark id>.xml`.
     :param header: keyword arguments of `export_scenario`.
+    :return: the file, and what is in it.
     :raises InputError: as `export_scenario`, and if the file cannot be written.
     :raises CrgameError: as `export_scenario`.
     """
     exported = export_scenario(log, **header)
-    write_text(exported.xml_text, scenario_path(out, exported.benchmark_id))
-    return exported
+    path = scenario_path(out, exported.benchmark_id)
+    write_text(exported.xml_text, path)
+    return path, exported
 
 
 def scenario_path(out: Path, benchmark_id: str, ending: str = COMMONROAD) -> Path:

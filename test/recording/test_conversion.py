@@ -12,7 +12,8 @@ from commonroad.common.reader.file_reader_xml import XMLFileReader
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import AvSpec
-from crgame_ros.recording.conversion import ConversionReport, convert
+from crgame_ros.recording.conversion import convert
+from crgame_ros.recording.export import ExportedScenario
 from crgame_ros.scenario.export_network import schema_errors
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
@@ -30,9 +31,9 @@ AV = (AvSpec('av0', 'constant-velocity'),)
 TOLERANCE = 1e-3
 
 
-def assert_holds(report: ConversionReport, result: OfflineResult) -> None:
+def assert_holds(made: Path, report: ExportedScenario, result: OfflineResult) -> None:
     """Compare the file with the run's rear-axle states and object poses at each tick."""
-    data = report.path.read_bytes()
+    data = made.read_bytes()
     assert schema_errors(etree.fromstring(data)) == []
     scenario, problems = XMLFileReader(data).open()
     setup = result.setup
@@ -63,13 +64,13 @@ def test_recordings_of_every_make(tmp_path: Path, recorder: Any, drive: Drive, k
     messages = recorder.messages(result, offset_ns=3_000_000_000)
     folder = recorder.ours(tmp_path / 'bag', messages) if kind == 'ours' else recorder.rosbag2(
         tmp_path / 'bag', messages, StoragePlugin[kind.upper()])
-    report = convert(folder)
-    assert report.path == tmp_path / 'C-ZAM_Traffic-1_1_T-1.xml'
+    made, report = convert(folder)
+    assert made == tmp_path / 'C-ZAM_Traffic-1_1_T-1.xml'
     assert (report.first_k, report.time_steps, report.notices) == (0, 21, ())
     assert len(report.obstacle_ids) == 2 + 6
-    assert_holds(report, result)
+    assert_holds(made, report, result)
     day = datetime.fromtimestamp(messages[0][2] * 1e-9, UTC).date().isoformat()
-    assert etree.parse(str(report.path)).getroot().get('date') == day == '2023-11-14'
+    assert etree.parse(str(made)).getroot().get('date') == day == '2023-11-14'
 
 
 @pytest.mark.slow
@@ -82,18 +83,18 @@ def test_recording_that_was_cut_off_or_began_late(tmp_path: Path, recorder: Any,
     (folder / 'metadata.yaml').unlink()
     file = folder / 'bag_0.mcap'
     file.write_bytes(file.read_bytes()[:-30_000])
-    report = convert(folder)
+    made, report = convert(folder)
     assert 2 < report.time_steps < 21
     assert 'was not finished' in report.notices[0]
-    assert_holds(report, result)
+    assert_holds(made, report, result)
     late = [m for m in messages if m[1].startswith('std_msgs/msg/String')
             or m[2] > messages[0][2] + 500_000_000]
-    report = convert(recorder.ours(tmp_path / 'late', late), tmp_path / 'late.xml')
+    made, report = convert(recorder.ours(tmp_path / 'late', late), tmp_path / 'late.xml')
     assert (report.first_k, report.time_steps) == (5, 16)
     assert report.notices == (
         'the recording begins at scenario step 5 of a run that began at 0',
         'time step 0 is scenario step 5 of the original')
-    assert_holds(report, result)
+    assert_holds(made, report, result)
 
 
 @pytest.mark.slow
@@ -107,14 +108,14 @@ def test_place_and_choice(tmp_path: Path, recorder: Any, drive: Drive) -> None:
                            log_ns=start + 5_000_000_000)])
     out = tmp_path / 'out'
     out.mkdir()
-    assert convert(bag, out).path == out / 'ZAM_Traffic-1_1_T-1.xml'
-    report = convert(bag, out, epoch=0)
-    assert report.path == out / 'ZAM_CutIn-1_1_T-1.xml'
-    assert_holds(report, first)
-    report = convert(bag, out / 'named.xml', epoch=1)
-    assert report.path == out / 'named.xml'
-    assert_holds(report, second)
-    assert_holds(convert(bag, out / 'named.xml', epoch=0), first)
+    assert convert(bag, out)[0] == out / 'ZAM_Traffic-1_1_T-1.xml'
+    made, report = convert(bag, out, epoch=0)
+    assert made == out / 'ZAM_CutIn-1_1_T-1.xml'
+    assert_holds(made, report, first)
+    made, report = convert(bag, out / 'named.xml', epoch=1)
+    assert made == out / 'named.xml'
+    assert_holds(made, report, second)
+    assert_holds(*convert(bag, out / 'named.xml', epoch=0), first)
     (out / 'named.xml').write_text(first.setup.loaded.xml_text)
     with pytest.raises(InputError, match='a file that is no exported run is there already'):
         convert(bag, out / 'named.xml')
@@ -126,14 +127,14 @@ def test_place_and_choice(tmp_path: Path, recorder: Any, drive: Drive) -> None:
         assert (tmp_path / path).is_file()
     assert main(['convert', str(bag), '--out', str(out / 'named.xml' / 'below')]) == 2
     # A bare file is a recording too; its folder gets the scenario.
-    assert convert(bag / 'bag_0.mcap').path == bag / 'ZAM_Traffic-1_1_T-1.xml'
+    assert convert(bag / 'bag_0.mcap')[0] == bag / 'ZAM_Traffic-1_1_T-1.xml'
 
 
 def test_exported_run_can_be_driven_again(tmp_path: Path, recorder: Any, drive: Drive) -> None:
     """The human of one run is a recorded obstacle of the next: its poses are those driven."""
     result = drive(TRAFFIC, duration_s=2.0, avs=AV)
-    report = convert(recorder.ours(tmp_path / 'bag', recorder.messages(result)))
-    obstacles = ScenarioObstacles(load_scenario(report.path))
+    made, report = convert(recorder.ours(tmp_path / 'bag', recorder.messages(result)))
+    obstacles = ScenarioObstacles(load_scenario(made))
     column = obstacles.ids.index(f'o{report.obstacle_ids["hv0"]}')
     states = result.states_of('hv0')[::10]
     found = np.array([obstacles.states_at(k).poses[column] for k in range(21)])

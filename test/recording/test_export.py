@@ -232,7 +232,7 @@ def test_file_is_written_whole_and_replaces_only_exports(runs: Any, tmp_path: Pa
     folder = tmp_path / 'out'
     folder.mkdir()
     for _ in range(2):
-        exported = write_scenario(log, folder)
+        _, exported = write_scenario(log, folder)
         assert [path.name for path in folder.iterdir()] == ['ZAM_CutIn-1_1_T-1.xml']
         assert (folder / 'ZAM_CutIn-1_1_T-1.xml').read_text() == exported.xml_text
     write_scenario(log, folder / 'mine.xml')

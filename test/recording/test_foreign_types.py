@@ -94,7 +94,7 @@ def test_log_times_that_no_clock_gives(log_ns: int, result: OfflineResult, recor
         assert (index.first_n, index.last_n) == (0, 100)
     assert describe(bag).cycles is not None
     assert np.array_equal(read_trajectories(bag).ks, np.arange(11))
-    assert convert(bag, tmp_path / 'run.xml').time_steps == 11
+    assert convert(bag, tmp_path / 'run.xml')[1].time_steps == 11
 
 
 def _unpack(file: Path, old: bytes, new: bytes) -> None:

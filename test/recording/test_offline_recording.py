@@ -107,8 +107,8 @@ def test_the_recording_is_measured_as_the_run_itself(result: OfflineResult, fold
 
 def test_it_becomes_the_scenario_of_the_run_itself(result: OfflineResult, folder: Path,
                                                    tmp_path: Path) -> None:
-    written = write_scenario(Run('run', result=result).log, tmp_path)
-    again = convert(folder / 'bag', tmp_path / 'converted.xml').path
+    _, written = write_scenario(Run('run', result=result).log, tmp_path)
+    again, _ = convert(folder / 'bag', tmp_path / 'converted.xml')
     assert again.read_text() == (tmp_path / f'{written.benchmark_id}.xml').read_text()
     assert not validate(folder / 'bag').faults
 

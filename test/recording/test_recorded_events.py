@@ -99,8 +99,8 @@ def test_converted_run_holds_what_events_did(tmp_path: Path, recorder: Any) -> N
     """
     original = play()
     bag = recorder.ours(tmp_path / 'bag', recorder.messages(original))
-    report = convert(bag, tmp_path)
-    found = ScenarioObstacles(load_scenario(report.path))
+    made, report = convert(bag, tmp_path)
+    found = ScenarioObstacles(load_scenario(made))
     for column, name in enumerate(('o200', 'o201', 'e_roadworks')):
         number = found.ids.index(f'o{report.obstacle_ids[name]}')
         poses = np.array([found.states_at(k).poses[number] for k in range(31)])
@@ -113,8 +113,8 @@ def test_converted_run_holds_what_events_did(tmp_path: Path, recorder: Any) -> N
 def test_put_from_the_start_is_a_static_obstacle(tmp_path: Path, recorder: Any) -> None:
     """It has its type, unlike a phantom obstacle."""
     bag = recorder.ours(tmp_path / 'bag', recorder.messages(play([(0, 'roadworks')])))
-    report = convert(bag, tmp_path)
-    scenario = load_scenario(report.path).scenario
+    made, report = convert(bag, tmp_path)
+    scenario = load_scenario(made).scenario
     (static,) = scenario.static_obstacles
     assert static.obstacle_id == report.obstacle_ids['e_roadworks']
     assert static.obstacle_type.value == 'constructionZone'

@@ -82,7 +82,7 @@ def test_a_stall_of_110_ms_leaves_no_trace_in_the_export(tmp_path: Path) -> None
     assert log.notices == ()
     assert len(log.ks) == 31
     assert of_log(log) < 0.02
-    exported = write_scenario(log, tmp_path)
+    _, exported = write_scenario(log, tmp_path)
     assert of_file(next(tmp_path.glob('*.xml')), exported.obstacle_ids['hv0']) < AGREES
     # The AV is stepped by n, so that its states are unchanged to the last bit.
     assert np.array_equal(log.vehicle_states[:, 1], stalled.states_of('av0')[::10])
@@ -131,13 +131,13 @@ def test_conversion_resamples_by_the_recorded_intervals(tmp_path: Path, recorder
     intervals_s = intervals_through({55: 110, 150: 60, 156: 110}, 300)
     result = drive(intervals_s)
     messages = recorder.messages(result, offset_ns=5_000_000_000, intervals_s=intervals_s)
-    report = convert(recorder.ours(tmp_path / 'bag', messages))
+    made, report = convert(recorder.ours(tmp_path / 'bag', messages))
     assert report.notices == ()
-    assert of_file(report.path, report.obstacle_ids['hv0']) < AGREES
+    assert of_file(made, report.obstacle_ids['hv0']) < AGREES
     (tmp_path / 'export').mkdir()
     write_scenario(trajectories_of(result), tmp_path / 'export')
     exported, _ = XMLFileReader(str(next((tmp_path / 'export').glob('*.xml')))).open()
-    converted, _ = XMLFileReader(str(report.path)).open()
+    converted, _ = XMLFileReader(str(made)).open()
     number = report.obstacle_ids['hv0']
     for step in range(31):
         places = [scenario.obstacle_by_id(number).state_at_time(step).position
@@ -159,7 +159,7 @@ def test_missing_intervals_are_told(tmp_path: Path, recorder: Any, notice: str,
         counts[message[0]] = counts.get(message[0], 0) + 1
         if not lost(message[0], counts[message[0]]):
             kept.append(message)
-    report = convert(recorder.ours(tmp_path / 'bag', kept))
+    _, report = convert(recorder.ours(tmp_path / 'bag', kept))
     assert len(report.notices) == 1 and notice in report.notices[0]
     assert report.time_steps == 31
 

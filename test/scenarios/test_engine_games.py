@@ -86,7 +86,7 @@ def test_export_is_read_back(name: str, tmp_path: Path) -> None:
     A reused slot of traffic is another obstacle each time.
     """
     result = played(name)
-    exported = write_scenario(trajectories_of(result), tmp_path)
+    _, exported = write_scenario(trajectories_of(result), tmp_path)
     scenario, _ = CommonRoadFileReader(str(tmp_path / f'{exported.benchmark_id}.xml')).open()
     there = np.isfinite(result.object_poses[..., 0])
     lives = there[0].sum() + (there[1:] & ~there[:-1]).sum()

@@ -84,7 +84,7 @@ def test_an_exported_run_driven_again_has_the_same_cast(tmp_path: Path) -> None:
     first = run_offline(build_setup(load_game(scenarios_directory() / 'cut_in.yaml')),
                         duration_s=8.0)
     log = trajectories_of(first)
-    exported = write_scenario(log, tmp_path / 'first.xml')
+    _, exported = write_scenario(log, tmp_path / 'first.xml')
     human = f'o{exported.obstacle_ids["hv0"]}'
     centers = log.vehicle_states[:, 0, :2] + 1.4227 * np.column_stack(
         (np.cos(log.vehicle_states[:, 0, 2]), np.sin(log.vehicle_states[:, 0, 2])))
@@ -107,8 +107,8 @@ def test_an_exported_run_driven_again_has_the_same_cast(tmp_path: Path) -> None:
 def test_the_file_names_the_human_vehicles(tmp_path: Path) -> None:
     """The source, which the schema leaves free, names them, for the last run only."""
     game = load_game(scenarios_directory() / 'cut_in.yaml')
-    exported = write_scenario(trajectories_of(run_offline(build_setup(game), duration_s=0.3)),
-                              tmp_path / 'run.xml')
+    _, exported = write_scenario(
+        trajectories_of(run_offline(build_setup(game), duration_s=0.3)), tmp_path / 'run.xml')
     source = etree.fromstring(exported.xml_text.encode()).get('source')
     assert source.endswith(
         f'ZAM_CutIn-1_1_T-1 driven in crgame_ros (human: planning problem '
@@ -116,8 +116,8 @@ def test_the_file_names_the_human_vehicles(tmp_path: Path) -> None:
     asked = build_setup(effective_game(RunRequest(scenario=tmp_path / 'run.xml', driver='idle')))
     assert asked.vehicle_ids == ('hv0', 'av0')
     assert f'o{exported.obstacle_ids["hv0"]}' in asked.obstacles.ids
-    again = write_scenario(trajectories_of(run_offline(asked, duration_s=0.2)),
-                           tmp_path / 'again.xml')
+    _, again = write_scenario(trajectories_of(run_offline(asked, duration_s=0.2)),
+                              tmp_path / 'again.xml')
     told = etree.fromstring(again.xml_text.encode()).get('source')
     # Two humans by now: the one that drove, and the one played back.
     assert told.count('(humans: ') == 1 and told.count('driven in crgame_ros') == 2

@@ -37,7 +37,7 @@ def test_traffic_runs_alone(shared_scenarios: Path, tmp_path: Path) -> None:
     way = np.diff(result.object_poses[:, agents, :2], axis=0)
     # On green some drive at least 20 m of the 80 m that 6 s at 13 m/s give.
     assert np.nanmax(np.nansum(np.hypot(way[..., 0], way[..., 1]), axis=0)) > 20.0
-    exported = write_scenario(trajectories_of(result), tmp_path)
+    _, exported = write_scenario(trajectories_of(result), tmp_path)
     written = load_scenario(tmp_path / f'{exported.benchmark_id}.xml')
     there = np.isfinite(result.object_poses[:, agents, 0]).any(axis=0).sum()
     assert len(written.scenario.dynamic_obstacles) >= there > 20
