@@ -86,10 +86,10 @@ def write_openscenario(log: RunTrajectories, out: Path, *, day: date | None = No
     from crgame_ros.recording.openscenario import export_openscenario
     name = log.game.benchmark_id or parse_scenario(log.xml_text, XML_TOPIC).benchmark_id
     path = scenario_path(out, name, OPENSCENARIO)
-    exported = export_openscenario(log, name, day=day, road=None if road is None else Path(
+    text, notices = export_openscenario(log, name, day=day, road=None if road is None else Path(
         os.path.relpath(road.resolve(), path.parent.resolve())).as_posix())
-    write_text(exported.xml_text, path)
-    return path, exported.notices
+    write_text(text, path)
+    return path, notices
 
 
 def read_last_run(bag: Path, progress: Callable[[float], object] | None = None) -> RunTrajectories:

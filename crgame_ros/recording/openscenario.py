@@ -67,19 +67,6 @@ _TRACK = 0.85
 
 
 @dataclass(frozen=True)
-class ExportedOpenScenario:
-    """
-    A run as a scenario of OpenSCENARIO.
-
-    :param xml_text: the content of the file, valid by the schema of version 1.2.
-    :param notices: the parts that it does not express, one line each.
-    """
-
-    xml_text: str
-    notices: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class _Track:
     """
     The motion of an entity at M times.
@@ -96,7 +83,7 @@ class _Track:
 
 
 def export_openscenario(log: RunTrajectories, benchmark_id: str, *, day: date | None = None,
-                        road: str | None = None) -> ExportedOpenScenario:
+                        road: str | None = None) -> tuple[str, tuple[str, ...]]:
     """
     Convert a run to OpenSCENARIO.
 
@@ -108,6 +95,8 @@ def export_openscenario(log: RunTrajectories, benchmark_id: str, *, day: date | 
     :param benchmark_id: of the scenario in which it took place.
     :param day: date of the run; that of the original if None.
     :param road: path of an OpenDRIVE file, as it is written; None for no road.
+    :return: the content of the file, valid by the schema of version 1.2, and the parts that it
+        does not express, one line each.
     :raises InputError: if the run has no step.
     :raises CrgameError: if the result violates the schema.
     """
@@ -140,7 +129,7 @@ def export_openscenario(log: RunTrajectories, benchmark_id: str, *, day: date | 
         xosc.Catalog(), osc_minor_version=_MINOR_VERSION,
         creation_date=datetime.combine(
             date.fromisoformat(when if guard.is_date(when) else '1970-01-01'), time()))
-    return ExportedOpenScenario(_document(scenario), tuple(map(one_line, notices)))
+    return _document(scenario), tuple(map(one_line, notices))
 
 
 def _omissions(log: RunTrajectories, original: etree._Element, road: str | None) -> list[str]:
@@ -167,14 +156,14 @@ def _tracks(log: RunTrajectories, times_s: FloatArray,
     columns = np.flatnonzero(seen).tolist()
     found = []
     for column, driven in enumerate(log.game.vehicles):
-        entity = _body_of(log.vehicles[column], driven.vehicle).entity
+        entity, _ = _body_of(log.vehicles[column], driven.vehicle)
         found.append((_driven_track(driven.id, times_s, states[:, column]), entity))
     for column in columns:
         item, poses = log.objects[column], log.object_poses[:, column]
-        body = _body_of(item, None)
+        entity, ahead = _body_of(item, None)
         x, y, _ = log.object_velocities[0, column]
         speed = float(np.nan_to_num(x * np.cos(poses[0, 2]) + y * np.sin(poses[0, 2])))
-        found.append((_Track(item.id, times_s, shifted(poses, body.ahead), speed), body.entity))
+        found.append((_Track(item.id, times_s, shifted(poses, ahead), speed), entity))
     notices += _body_notices([*log.vehicles, *(log.objects[column] for column in columns)])
     if missing := len(log.objects) - len(columns):
         notices.append(f'{missing} objects never appeared in the run and are left out')
@@ -275,20 +264,8 @@ def _document(scenario: xosc.Scenario) -> str:
     return text
 
 
-@dataclass(frozen=True)
-class Body:
-    """
-    A vehicle or object in OpenSCENARIO.
-
-    :param entity: its description.
-    :param ahead: from the reference point of its recorded poses forward to that of the entity [m]
-    """
-
-    entity: xosc.Vehicle | xosc.Pedestrian | xosc.MiscObject
-    ahead: float
-
-
-def _body_of(item: ObjectDescription, parameters: VehicleParameters | None) -> Body:
+def _body_of(item: ObjectDescription, parameters: VehicleParameters | None,
+             ) -> tuple[xosc.Vehicle | xosc.Pedestrian | xosc.MiscObject, float]:
     """
     Describe a vehicle or object.
 
@@ -296,25 +273,25 @@ def _body_of(item: ObjectDescription, parameters: VehicleParameters | None) -> B
     the length as that of the games' own objects of its type.
 
     :param parameters: of a driven vehicle, None for everything else.
+    :return: its description, and the distance from the reference point of its recorded poses
+        forward to that of the description [m]
     """
+    ahead = 0.0
     if item.type == PEDESTRIAN:
         entity = xosc.Pedestrian(item.id, _PEDESTRIAN_MASS, xosc.PedestrianCategory.pedestrian,
                                  _box(item.shape, item.height, 0.0))
-        ahead = 0.0
     elif item.type not in VEHICLES:
         category = THINGS.get(item.type, xosc.MiscObjectCategory.obstacle)
         entity = xosc.MiscObject(item.id, _THING_MASS, category,
                                  _box(item.shape, item.height, 0.0))
-        ahead = 0.0
     elif parameters is not None:
         entity = _driven(item, parameters)
-        ahead = 0.0
     else:
         entity, ahead = _other_vehicle(item)
     entity.add_property('role', item.role.value)
     # esmini turns an entity between two vertices, not only around them.
     entity.add_property('plineInterpolation', 'segment')
-    return Body(entity, ahead)
+    return entity, ahead
 
 
 def _body_notices(items: list[ObjectDescription]) -> list[str]:
