@@ -11,7 +11,6 @@ Short gaps are filled from the states around them and reported; longer ones cut 
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import NamedTuple
 
 from crgame_ros.game.game import TimingSpec
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
@@ -136,24 +135,14 @@ def cubic(share: FloatArray, length: FloatArray, displacement: FloatArray,
             + share * rest * length * (rest * start_rates - share * end_rates))
 
 
-class Stretch(NamedTuple):
-    """
-    Consecutive scenario steps that a recording covers.
-
-    :param ticks: (K) their steps n.
-    :param notices: the missing parts of the run and the reasons, one line each.
-    """
-
-    ticks: IntArray
-    notices: tuple[str, ...]
-
-
-def longest_stretch(recorded: Mapping[str, IntArray], scheduler: ScenarioScheduler) -> Stretch:
+def longest_stretch(recorded: Mapping[str, IntArray], scheduler: ScenarioScheduler,
+                    notices: list[str]) -> IntArray:
     """
     Return the scenario steps of a run: the longest piece without a gap that cannot be filled.
 
     :param recorded: by topic the increasing steps n that it holds; for objects only the ticks.
-    :return: without ticks if the topics have none in common.
+    :param notices: receives the missing parts of the run and the reasons, one line each.
+    :return: (K) their steps n; none if the topics have none in common.
     """
     per_tick, k0 = scheduler.steps_per_tick, scheduler.k0
     pieces: list[tuple[int, int]] = [(0, int(max(ns[-1] for ns in recorded.values())))]
@@ -166,13 +155,12 @@ def longest_stretch(recorded: Mapping[str, IntArray], scheduler: ScenarioSchedul
         pieces = [(max(a, c), min(b, d)) for a, b in pieces for c, d in whole
                   if max(a, c) <= min(b, d)]
     spans = [(-(-a // per_tick), b // per_tick + 1) for a, b in pieces]
-    first, end = max((span for span in spans), key=lambda span: span[1] - span[0],
-                     default=(0, 0))
+    first, end = max(spans, key=lambda span: span[1] - span[0], default=(0, 0))
     if end <= first:
-        return Stretch(np.empty(0, dtype=np.int64), ())
+        return np.empty(0, dtype=np.int64)
     last_seen = max(int(ns[-1]) for ns in recorded.values()) // per_tick
-    return Stretch(per_tick * np.arange(first, end), tuple(
-        _describe_gaps(gaps, k0 + first, k0 + end - 1, k0 + last_seen, k0)))
+    notices += _describe_gaps(gaps, k0 + first, k0 + end - 1, k0 + last_seen, k0)
+    return per_tick * np.arange(first, end)
 
 
 def farthest(scheduler: ScenarioScheduler) -> int:

@@ -162,7 +162,10 @@ def read_trajectories(path: Path, epoch: int | None = None,
         recorded[OBJECT_STATES_TOPIC] = {n: point for n, point in points[
             OBJECT_STATES_TOPIC].items() if scheduler.is_tick(n)}
     steps = {topic: np.array(sorted(found), dtype=np.int64) for topic, found in recorded.items()}
-    ticks = _ticks(path, run, steps, notices)
+    ticks = longest_stretch(steps, scheduler, notices)
+    if not len(ticks):
+        raise InputError('no scenario step of the run is in it', str(path),
+                         'record from before the start of the run')
     for topic, states in spares.items():
         if taken := len(states.keys() & set(ticks.tolist())):
             notices.append(f'{taken} scenario steps of {VEHICLES_TOPIC} are those of {topic}')
@@ -233,17 +236,6 @@ def _spare_states(points: Mapping[str, Mapping[int, FloatArray]], run: Epoch
     starts = [vehicle_to_joints(item.state) for item in run.game.vehicles]
     return {TICK_STATES_TOPIC: ticks,
             GAME.topic: {0: np.array(starts).reshape(-1, 3, 4).swapaxes(0, 1).reshape(3, -1)}}
-
-
-def _ticks(path: Path, run: Epoch, steps: Mapping[str, IntArray],
-           notices: list[str]) -> IntArray:
-    """Choose the steps n of the ticks of a run."""
-    stretch = longest_stretch(steps, run.game.scheduler)
-    if not len(stretch.ticks):
-        raise InputError('no scenario step of the run is in it', str(path),
-                         'record from before the start of the run')
-    notices += stretch.notices
-    return stretch.ticks
 
 
 def _cycles(reader: BagReader, run: Epoch, points: Mapping[str, dict[int, FloatArray]],
