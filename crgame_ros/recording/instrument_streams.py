@@ -4,7 +4,7 @@
 
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
 from pathlib import Path
 from typing import NamedTuple
@@ -67,21 +67,23 @@ class _Batch(NamedTuple):
     texts: tuple[tuple[str, ...], ...]
 
 
-@dataclass
 class _Lists:
     """The recorded lists of streams, with their log times [ns]."""
 
-    found: list[tuple[int, dict[int, InstrumentStream]]] = field(default_factory=list)
+    def __init__(self, reader: BagReader) -> None:
+        self._found: list[tuple[int, dict[int, InstrumentStream]]] = [
+            (log_ns, {stream.number: stream for stream in document.streams})
+            for log_ns, document in reader.documents(STREAMS)]
 
     def of(self, number: int, log_ns: int) -> InstrumentStream | None:
         """Return the stream of a message; a node that was started again numbers anew."""
-        known = [(at_ns, streams[number]) for at_ns, streams in self.found if number in streams]
+        known = [(at_ns, streams[number]) for at_ns, streams in self._found if number in streams]
         before = [stream for at_ns, stream in known if at_ns <= log_ns + _LATE_NS]
         return before[-1] if before else known[0][1] if known else None
 
     def last(self, key: tuple[str, ...]) -> InstrumentStream:
         """Return the newest description of a stream."""
-        return next(stream for _, streams in reversed(self.found)
+        return next(stream for _, streams in reversed(self._found)
                     for stream in streams.values() if _key(stream) == key)
 
 
@@ -101,7 +103,7 @@ def read_streams(path: Path, epoch: int | None = None) -> tuple[RecordedStream, 
         starts, from_s, until_s = _clock(reader, game.epoch)
         if not len(starts):
             return ()
-        lists = _lists(reader)
+        lists = _Lists(reader)
         batches: dict[tuple[str, ...], list[_Batch]] = defaultdict(list)
         for stream, batch in _batches(reader, lists):
             last = lists.last(_key(stream))
@@ -139,13 +141,6 @@ def _clock(reader: BagReader, epoch: int) -> tuple[FloatArray, float, float]:
         elif others_s[0] > starts[-1, 1]:
             until_s = min(until_s, others_s[0])
     return starts, from_s, until_s
-
-
-def _lists(reader: BagReader) -> _Lists:
-    lists = _Lists()
-    for log_ns, document in reader.documents(STREAMS):
-        lists.found.append((log_ns, {stream.number: stream for stream in document.streams}))
-    return lists
 
 
 def _batches(reader: BagReader, lists: _Lists) -> Iterator[tuple[InstrumentStream, _Batch]]:
