@@ -83,18 +83,21 @@ def check_events(game: Game, where: str, network: RoadNetwork, obstacles: Scenar
 def _named(event: EventSpec) -> list[tuple[str, str | int]]:
     """Return the names in an event, each with its kind."""
     named: list[tuple[str, str | int]] = []
-    action, when = event.action, event.when
+    action = event.action
     if isinstance(action, Release | Brake):
         named.append(('moving obstacle', f'o{action.object}'))
     elif isinstance(action, SpeedLimit):
         named += [('lanelet', lanelet) for lanelet in action.lanelets]
     elif isinstance(action, PlanDisplay | PlannerSwap | PlannerRun):
         named.append(('AV', action.av))
-    if isinstance(when, Near):
-        named.append(('vehicle or object', when.vehicle))
-    elif isinstance(when, Between):
-        named += [('vehicle or object', name) for name in when.between]
-    return named
+    return [*named, *(('vehicle or object', name) for name in _named_by(event.when))]
+
+
+def _named_by(condition: object) -> tuple[str, ...]:
+    """Return the vehicles and objects that a condition names."""
+    if isinstance(condition, Near):
+        return (condition.vehicle,)
+    return condition.between if isinstance(condition, Between) else ()
 
 
 def check_changes(game: Game, where: str, agents: Sequence[str]) -> None:
@@ -170,14 +173,9 @@ def check_tasks(tasks: Sequence[TaskSpec], events: Sequence[EventSpec], where: s
             raise InputError(f'there is no vehicle "{spec.seat}"' if spec.seat
                              else 'the game has no driven vehicle', place, _defined(vehicles))
         for condition in (spec.when, spec.until):
-            named: Sequence[str] = ()
             if isinstance(condition, OnEvent):
                 _check_event(condition.event, by_name, place)
-            elif isinstance(condition, Near):
-                named = (condition.vehicle,)
-            elif isinstance(condition, Between):
-                named = condition.between
-            for name in named:
+            for name in _named_by(condition):
                 if name not in (*vehicles, *objects):
                     raise InputError(f'there is no vehicle or object "{name}"', place,
                                      _defined(vehicles))
