@@ -112,12 +112,10 @@ def parse_qos(value: object, where: str) -> tuple[TopicQos, ...]:
         return tuple(TopicQos(int(entry['depth']), _named(entry['reliability'], _RELIABILITIES),
                               _named(entry['durability'], _DURABILITIES))
                      for entry in entries or [])
-    except InputError as error:
-        raise InputError(f'its offered_qos_profiles cannot be read ({error.what})', where,
-                         'record again, or correct the entry') from error
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError,
+    except (InputError, KeyError, TypeError, ValueError, IndexError, OverflowError,
             AttributeError) as error:
-        raise InputError(f'its offered_qos_profiles cannot be read ({error!r})', where,
+        reason = error.what if isinstance(error, InputError) else repr(error)
+        raise InputError(f'its offered_qos_profiles cannot be read ({reason})', where,
                          'record again, or correct the entry') from error
 
 
