@@ -70,26 +70,6 @@ class RecordedPlan(NamedTuple):
     told: VehicleState | None
 
 
-class OpenRequests:
-    """The sending times of requests that have not been answered yet."""
-
-    def __init__(self) -> None:
-        self._asked_ns: dict[tuple[str, int], int] = {}
-
-    def sent(self, av: str, stamp_ns: int, log_time_ns: int) -> None:
-        """Store a request; a repeated request counts from its last sending."""
-        self._asked_ns[av, stamp_ns] = log_time_ns
-
-    def answered(self, av: str, stamp_ns: int, log_time_ns: int) -> int | None:
-        """
-        Return the log time between a request and its answer [ns].
-
-        :return: None if no request with that stamp is open.
-        """
-        asked_ns = self._asked_ns.pop((av, stamp_ns), None)
-        return None if asked_ns is None else log_time_ns - asked_ns
-
-
 def read_plans(path: Path, epoch: int | None = None,
                progress: Callable[[float], object] | None = None) -> Iterator[RecordedPlan]:
     """
@@ -104,26 +84,29 @@ def read_plans(path: Path, epoch: int | None = None,
         run = read_epoch(reader, epoch)
         requests = {f'/{av.id}/plan_request': av.id for av in run.game.avs}
         plans = {f'/{av.id}/plan': av.id for av in run.game.avs}
-        times, kept = OpenRequests(), OrderedDict[tuple[str, int], BagMessage]()
+        # By AV and stamp: the log times of open requests [ns], and the last requests themselves.
+        sent_ns: dict[tuple[str, int], int] = {}
+        kept = OrderedDict[tuple[str, int], BagMessage]()
         for message in reader.messages((*requests, *plans)):
             stamp_ns = header_stamp_ns(message.data)
             if not run.holds(stamp_ns, message.log_time_ns):
                 continue
             if message.topic in requests:
                 av = requests[message.topic]
-                times.sent(av, stamp_ns, message.log_time_ns)
+                # A repeated request counts from its last sending.
+                sent_ns[av, stamp_ns] = message.log_time_ns
                 kept[av, stamp_ns] = message
                 if len(kept) > _KEPT * len(requests):
                     kept.popitem(last=False)
                 continue
             av = plans[message.topic]
-            lapse_ns = times.answered(av, stamp_ns, message.log_time_ns)
+            asked_ns = sent_ns.pop((av, stamp_ns), None)
             plan, fault = _plan(reader, message, av, run)
             asked, n = kept.get((av, stamp_ns)), run.game.scheduler.tick_of_stamp(stamp_ns)
             yield RecordedPlan(
                 av, stamp_ns, None if n is None else run.game.scheduler.k(n),
-                math.nan if lapse_ns is None else lapse_ns * 1e-9, plan, fault,
-                None if asked is None else _requested_state(asked, av))
+                math.nan if asked_ns is None else (message.log_time_ns - asked_ns) * 1e-9, plan,
+                fault, None if asked is None else _requested_state(asked, av))
 
 
 def _plan(reader: BagReader, message: BagMessage, av: str, run: Epoch) -> tuple[Plan | None, str]:

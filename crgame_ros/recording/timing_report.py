@@ -19,7 +19,6 @@ from crgame_ros.planner.adapter import first_of_kind
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recorded_plans import (
-    OpenRequests,
     PlanOutcome,
     plans_of_result,
     RunReport,
@@ -221,7 +220,8 @@ class _Collector:
         self.verdicts: list[VehicleDrivability] = []
         self.fired: tuple[FiredEvent, ...] = ()
         self._lasting: dict[str, set[str]] = defaultdict(set)
-        self._open = OpenRequests()
+        # By AV and stamp [ns]; a repeated request counts from its last sending.
+        self._sent_ns: dict[tuple[str, int], int] = {}
         self._latencies_ms: dict[str, list[float]] = defaultdict(list)
         self._first_latency_ms: dict[str, float] = {}
         self._answers: dict[str, int] = defaultdict(int)
@@ -244,7 +244,7 @@ class _Collector:
             return
         # Requests and plans are large, and their stamp is enough.
         if topic in self._requests:
-            self._open.sent(self._requests[topic], stamp_ns, log_time_ns)
+            self._sent_ns[self._requests[topic], stamp_ns] = log_time_ns
         elif topic in self._plans:
             self._add_plan(self._plans[topic], stamp_ns, log_time_ns)
         else:
@@ -271,10 +271,10 @@ class _Collector:
 
     def _add_plan(self, av: str, stamp_ns: int, log_time_ns: int) -> None:
         self._answers[av] += 1
-        lapse_ns = self._open.answered(av, stamp_ns, log_time_ns)
-        if lapse_ns is None:
+        asked_ns = self._sent_ns.pop((av, stamp_ns), None)
+        if asked_ns is None:
             return
-        latency_ms = lapse_ns * 1e-6
+        latency_ms = (log_time_ns - asked_ns) * 1e-6
         if stamp_ns == self._run.game.scheduler.clock_offset_ns:
             # The run waits for this first answer, and the planner for its imports.
             self._first_latency_ms[av] = latency_ms
