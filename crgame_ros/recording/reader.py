@@ -211,9 +211,7 @@ class BagReader:
         :raises InputError: as `decoded`.
         """
         newest = deque(self.messages([topic]), maxlen=1)
-        for message in newest:
-            return self.decode(message)
-        return None
+        return self.decode(newest[0]) if newest else None
 
     def _deserialize(self, topic: str, type_name: str, data: bytes) -> object:
         try:
