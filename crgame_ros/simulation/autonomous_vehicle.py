@@ -148,7 +148,8 @@ class AutonomousVehicle:
         self.believed: VehicleState | None = None
         self._busy_since: int | None = None
         self._followed_request_n = -1
-        self._without_plan = False
+        # Whether the vehicle brakes because its plan is used up or never came.
+        self.uses_no_plan = False
         # A stopped planner gets no requests; the vehicle follows its last plan, then brakes.
         self.planner_running = True
         self._driven: HumanVehicle | None = None
@@ -165,11 +166,6 @@ class AutonomousVehicle:
     def busy(self) -> bool:
         """Return whether a request has not been answered yet."""
         return self._busy_since is not None
-
-    @property
-    def uses_no_plan(self) -> bool:
-        """Return whether the vehicle brakes because its plan is used up or never came."""
-        return self._without_plan
 
     def plan_age_steps(self, n: int) -> int | None:
         """Return the steps since the request of the followed plan; None without a plan."""
@@ -335,7 +331,7 @@ class AutonomousVehicle:
         if self.execution is not None:
             self.execution.reset(self.state)
         self._given_back_n = None
-        self._without_plan = False
+        self.uses_no_plan = False
         self.state = self._driven.step(command, dt_s)
         return self.state
 
@@ -366,7 +362,7 @@ class AutonomousVehicle:
         if self.execution is not None and not rolls:
             return self._tracked(self.execution, n)
         planned = None if self._given_back_n is not None else self._tracker.sample(n)
-        self._without_plan = planned is None and not rolls
+        self.uses_no_plan = planned is None and not rolls
         if rolls:
             return self._held(0.0)
         if planned is None:
@@ -379,8 +375,8 @@ class AutonomousVehicle:
         reference = None
         if self._given_back_n is None and self._reference is not None:
             reference = self._reference.at(self._tracker.time_s(n - 1))
-        self._without_plan = reference is None or reference.used_up
-        self.counters.steps_without_plan += self._without_plan
+        self.uses_no_plan = reference is None or reference.used_up
+        self.counters.steps_without_plan += self.uses_no_plan
         return execution.step(self.state, reference, self.believed)
 
     def _rolls_on(self, n: int) -> bool:

@@ -225,16 +225,13 @@ class PlanIndicators:
         # The last step at which a driver had it.
         self._driven_n = [-1] * len(self._each)
         self._apart = max(1, round(APART_S / self._scheduler.dt_s))
+        # The steps of a tick that check plans: those without requests.
+        self._steps_in_tick = max(1, self._scheduler.steps_per_tick - 1)
         steps_s = self._scheduler.time_step_s / self._steps_in_tick
         self._period = max(1, round(LOOK_EVERY_S / steps_s), len(self._each))
         self._place_at = {place * self._period // len(self._each): place
                           for place in range(len(self._each))}
         self.shown = [0] * len(setup.avs)
-
-    @property
-    def _steps_in_tick(self) -> int:
-        """Return how many steps of a tick check plans: those without requests."""
-        return max(1, self._scheduler.steps_per_tick - 1)
 
     def update(self, n: int, avs: Sequence[AutonomousVehicle]) -> None:
         """Update, at step n, the indicator of the AV whose turn it is, and clear unused ones."""
