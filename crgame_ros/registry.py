@@ -99,7 +99,7 @@ class ModelRegistry(Generic[Model]):
         :raises InputError: if there is none of that name, or it is not of this kind.
         """
         label = self.label(name, where)
-        found = self.resolve(name, where, label)
+        found = self.resolve(name, where)
         if not (inspect.isclass(found) and issubclass(found, self._base)):
             raise InputError(f'is no {self.kind}', label, 'derive the class from '
                              f'{self._base.__module__}.{self._base.__qualname__}')
@@ -108,30 +108,26 @@ class ModelRegistry(Generic[Model]):
             raise InputError(f'does not define {missing}', label, self._remedy)
         return found
 
-    def resolve(self, name: str, where: str, label: str) -> object:
+    def resolve(self, name: str, where: str) -> object:
         """
         Return the object that a name stands for, of any kind.
 
         :param where: as for `find`.
-        :param label: description of the object in messages.
         :raises InputError: if there is none of that name.
         """
-        found: object
+        label = self.label(name, where)
         if name in self.built_in:
-            found = _from_module(self.built_in[name], label)
-        elif ':' in name:
+            return _from_module(self.built_in[name], label)
+        if ':' in name:
             source, _, attribute = name.rpartition(':')
-            found = (self._from_file(Path(source), attribute, label) if source.endswith('.py')
-                     else _from_module(name, label))
-        else:
-            points = [point for point in entry_points(group=self.entry_point_group)
-                      if point.name == name]
-            if not points:
-                raise InputError(f'there is no {self.kind} "{name}"', where or self.kind,
-                                 f'known are {", ".join(self.names())}, or give module:Class or '
-                                 'file.py:Class')
-            found = _from_module(points[0].value, label)
-        return found
+            return (self._from_file(Path(source), attribute, label) if source.endswith('.py')
+                    else _from_module(name, label))
+        for point in entry_points(group=self.entry_point_group):
+            if point.name == name:
+                return _from_module(point.value, label)
+        raise InputError(f'there is no {self.kind} "{name}"', where or self.kind,
+                         f'known are {", ".join(self.names())}, or give module:Class or '
+                         'file.py:Class')
 
     def label(self, name: str, where: str = '') -> str:
         """Return the description of an object in messages, with the place that names it."""

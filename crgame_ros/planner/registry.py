@@ -48,10 +48,10 @@ class PlannerRegistry(ModelRegistry[Planner]):
         finally:
             self._given = earlier
 
-    def resolve(self, name: str, where: str, label: str) -> object:
+    def resolve(self, name: str, where: str) -> object:
         """Find the class for a name; for an object that the caller has given, its class."""
         if name not in self._given:
-            return super().resolve(name, where, label)
+            return super().resolve(name, where)
         given = self._given[name]
         return given if inspect.isclass(given) else type(given)
 
