@@ -66,34 +66,11 @@ NAME, NUMBERS = 'REPRODUCTION.md', 'comparison.json'
 _SHOWN = ('.svg', '.png')
 
 
-def write_run_figures(run: Alternative, numbers: tuple[int, int], name: str, folder: Path,
-                      formats: Sequence[str]) -> tuple[Path, ...]:
-    """
-    Draw frames and profiles of a run.
-
-    :param numbers: numbers of the paper's figures of frames and of profiles.
-    :param name: name of the run, for the files' names.
-    :return: the files.
-    :raises InputError: if a file cannot be written.
-    """
-    log = run.log
-    record = RunRecord(log, np.empty(0, dtype=np.int64),
-                       np.empty((0, len(log.vehicles), len(COMMAND_COLUMNS))), ())
-    moments = critical_moments(record, run.criticality, run.contacts or ())
-    scene = FrameScene(log)
-    frames, profiles = numbers
-    written = list(_write(frames_figure(scene, _panel_steps(run)),
-                          folder / f'figure_{frames:02}_{name}_frames', formats))
-    written += _write(profiles_figure(record, moments[:1]),
-                      folder / f'figure_{profiles:02}_{name}_profiles', formats)
-    return tuple(written)
-
-
 def write_timing_figure(found: Synchronization, folder: Path,
                         formats: Sequence[str]) -> tuple[Path, ...]:
     """Draw figure 14 and write table I; return the files."""
-    written = list(_write(timing_figure((found.proposed, found.naive)),
-                          folder / 'figure_14_timing', formats))
+    written = _write(timing_figure((found.proposed, found.naive)), folder / 'figure_14_timing',
+                     formats)
     table = found.table
     for suffix, text in (('txt', table.text()), ('csv', table.csv()), ('md', table.markdown())):
         path = folder / f'table_1.{suffix}'
@@ -111,13 +88,13 @@ def _panel_steps(run: Alternative) -> tuple[int, ...]:
     return tuple(ks[first::stride][:PANELS].tolist())
 
 
-def _write(figure: Figure, place: Path, formats: Sequence[str]) -> tuple[Path, ...]:
+def _write(figure: Figure, place: Path, formats: Sequence[str]) -> list[Path]:
     paths = []
     for file_format in formats:
         path = place.with_name(f'{place.name}.{file_format}')
         write_bytes(figure_bytes(figure, file_format), path)
         paths.append(path)
-    return tuple(paths)
+    return paths
 
 
 @dataclass(frozen=True)
@@ -234,11 +211,23 @@ def evaluate_timing(request: EvaluationRequest) -> tuple[EvaluationPart, Synchro
 
 def _pictured(request: EvaluationRequest, run: Alternative, numbers: tuple[int, int],
               name: str) -> tuple[Path, ...]:
-    """Draw a run, and write it as a scenario."""
+    """
+    Write a run as a scenario, and draw its frames and profiles; return the figures.
+
+    :param numbers: of the paper's figures of frames and of profiles.
+    :param name: name of the run, for the files' names.
+    """
+    log, folder, formats = run.log, request.folder, request.formats
     request.runs.mkdir(exist_ok=True)
-    scenario = request.runs / f'{name}.xml'
-    write_scenario(run.log, scenario)
-    return write_run_figures(run, numbers, name, request.folder, request.formats)
+    write_scenario(log, request.runs / f'{name}.xml')
+    record = RunRecord(log, np.empty(0, dtype=np.int64),
+                       np.empty((0, len(log.vehicles), len(COMMAND_COLUMNS))), ())
+    moments = critical_moments(record, run.criticality, run.contacts or ())
+    frames, profiles = numbers
+    return (*_write(frames_figure(FrameScene(log), _panel_steps(run)),
+                    folder / f'figure_{frames:02}_{name}_frames', formats),
+            *_write(profiles_figure(record, moments[:1]),
+                    folder / f'figure_{profiles:02}_{name}_profiles', formats))
 
 
 def write_report(request: EvaluationRequest, single: EvaluationPart, multi: EvaluationPart,
