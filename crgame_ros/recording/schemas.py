@@ -14,19 +14,15 @@ _VEHICLE = re.compile(r'/(hv|av)\d{1,3}(/.+)')
 
 
 @lru_cache(maxsize=4096)
-def contract_type(topic: str) -> str | None:
-    """Return package/msg/Type of a topic; None for a topic that is not in the contract."""
+def is_foreign(topic: str, type_name: str) -> bool:
+    """Return whether a message cannot be one of a run: another type on a topic of the contract."""
     topics = load_contract().topics
     names = [topic]
     vehicle = _VEHICLE.fullmatch(topic)
     if vehicle is not None:
         names += [f'/<{vehicle.group(1)}>{vehicle.group(2)}', f'/<v>{vehicle.group(2)}']
-    return next((topics[name].type_name for name in names if name in topics), None)
-
-
-def is_foreign(topic: str, type_name: str) -> bool:
-    """Return whether a message cannot be one of a run: another type on a topic of the contract."""
-    return contract_type(topic) not in (None, type_name)
+    wanted = next((topics[name].type_name for name in names if name in topics), None)
+    return wanted not in (None, type_name)
 
 
 @cache
