@@ -145,7 +145,8 @@ class Run(MeasuredRun):
         out = as_path(path, 'path')
         prepare_folder(out)
         file, notices = self.exported(out)
-        warn_of(notices)
+        for notice in notices:
+            warnings.warn(notice, stacklevel=2)
         return file
 
     def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
@@ -168,12 +169,6 @@ class Run(MeasuredRun):
         caption = f'{self.name}: {self.game.benchmark_id}, {self.duration_s:.1f} s' + (
             f', states {self.state_hash[:12]}…' if self.state_hash else '')
         return run_html(self, caption)
-
-
-def warn_of(notices: Iterable[str]) -> None:
-    """Show notices as warnings."""
-    for notice in notices:
-        warnings.warn(notice, stacklevel=3)
 
 
 class Named(dict[str, _Value]):
