@@ -60,7 +60,11 @@ def load_steering_ratio(path: str) -> SteeringRatioTable:
     :raises InputError: if the file is missing or is no ascending grid of positive ratios.
     """
     if path.startswith('{'):
-        values, path = _from_text(path), 'table of steering ratios'
+        text, path = path, 'table of steering ratios'
+        try:
+            values = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise InputError('is no JSON', path, 'send it whole') from error
     else:
         values = read_yaml(Path(path), 'table of steering ratios')
     table = read(SteeringRatioTable, values, path)
@@ -77,13 +81,6 @@ def load_steering_ratio(path: str) -> SteeringRatioTable:
 def table_text(path: str) -> str:
     """Return the text of a ratio table, for a program without its file."""
     return json.dumps(write(load_steering_ratio(path)))
-
-
-def _from_text(text: str) -> object:
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError('is no JSON', 'table of steering ratios', 'send it whole') from error
 
 
 class Steering:
