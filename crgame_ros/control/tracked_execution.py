@@ -80,8 +80,7 @@ class TrackedExecution:
         :return: the true state a step later
         """
         if reference is None or reference.used_up:
-            self.errors = None
-            self._plans.clear()
+            self._forget()
             return self._moved(state, self._braking(state))
         if state.speed == 0.0:
             self.model.gear = int(reference.track.direction(reference.since_s))
