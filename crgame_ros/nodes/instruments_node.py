@@ -194,7 +194,7 @@ class InstrumentsNode(Node):
                 self._configure(spec)
             self._open(game, spec)
         except CrgameError as error:
-            self._game = self._streams = None
+            self._game = self._streams = self._markers = None
             self.get_logger().error(str(error))
             return
         self._game, self._spec = game, spec

@@ -130,8 +130,7 @@ class SimInputs:
     def pop_agents(self) -> list[JointSeries]:
         """Return the agents' states that have come; the rest of a flood waits."""
         taken: list[JointSeries] = []
-        while self._agents is not None and len(taken) < MAX_AGENTS \
-                and (message := self._agents.pop()) is not None:
+        for message in () if self._agents is None else self._agents.waiting(MAX_AGENTS):
             with suppress(InputError):
                 taken.append(from_joint_trajectory(message, '/traffic/agents'))
         return taken
