@@ -4,7 +4,7 @@
 set -euo pipefail
 usage='Build with colcon and run the tests.
 
-  ./test.sh                       what decides whether a change lands: ten to twenty minutes on two cores
+  ./test.sh                       what decides whether a change lands: ten to twenty-five minutes on two cores
   ./test.sh --quick               without ROS graphs and browsers: three to ten minutes
   ./test.sh --all                 everything: every case of each matrix, what clocks show, coverage
   ./test.sh test/driver -k ramp   some tests, by arguments of pytest
