@@ -28,12 +28,14 @@ from crgame_ros.cockpit.exposure import Exposure
 from crgame_ros.cockpit.server import listen
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
+from crgame_ros.study.conduct.reception_run import ReceptionRequest, Sessions
 from crgame_ros.study.desk.desk import Desk, PINGS
 from crgame_ros.study.desk.pages import words_of
 from crgame_ros.study.desk.participant_document import participant_document
 from crgame_ros.study.desk.reception import create_reception_app, Reception
-from crgame_ros.study.desk.server import serve_desk
+from crgame_ros.study.desk.server import PARTICIPANT, serve_desk
 from crgame_ros.study.elsewhere import Elsewhere, PlatformIds
+from crgame_ros.study.folder import StudyFolder
 from crgame_ros.study.participant_session import ParticipantSession
 import pytest
 
@@ -284,6 +286,27 @@ def test_without_a_platform_there_is_no_code(tmp_path: Path) -> None:
         session.end('tired')
         told = participant_document(Desk(session, DrivesWithoutGraph(session)))
         assert (told['how'], told['code'], told['address']) == ('ended', '', '')
+
+
+class _Talkative(Sessions):
+    """Sessions of a program that prints a line of a megabyte before its link, and waits."""
+
+    def _command(self, participant: str, place: int) -> list[str]:
+        return [sys.executable, '-c', 'import time; print("x" * 10**6); '
+                f'print("{PARTICIPANT}, page: https://a/", flush=True); time.sleep(600)']
+
+
+@in_loop
+async def test_a_session_that_prints_a_very_long_line_goes_on(tmp_path: Path) -> None:
+    """The line is left out; the session keeps its place, and ends with the reception."""
+    said: list[str] = []
+    sessions = _Talkative(ReceptionRequest(
+        write_study(tmp_path / 'study', elsewhere=PLATFORM), tmp_path / 'study' / 'study.yaml',
+        StudyFolder(tmp_path / 'data'), Exposure('127.0.0.1', 0), 1), said.append)
+    assert await sessions.receive('P01') == Reception('https://a/', 'failed')
+    await sessions.end()
+    assert await sessions.receive('P02') == Reception(why='full')
+    assert not [line for line in said if 'xx' in line]
 
 
 @in_loop

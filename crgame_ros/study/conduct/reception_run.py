@@ -3,7 +3,7 @@
 """Receives a platform's participants, and conducts their sessions in processes of their own."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 import contextlib
 from dataclasses import dataclass
 import os
@@ -131,7 +131,7 @@ class Sessions:
             if self._is_ending:
                 process.send_signal(signal.SIGINT)
             assert process.stdout is not None
-            async for line in process.stdout:
+            async for line in _lines(process.stdout):
                 text = line.decode('utf-8', 'replace').rstrip()
                 if text.startswith(f'{PARTICIPANT}, ') and not link.done():
                     link.set_result(text.split()[-1])
@@ -143,6 +143,14 @@ class Sessions:
                 link.set_result('')
             self._processes.pop(participant, None)
             del self._links[participant], self._places[participant]
+
+
+async def _lines(stream: asyncio.StreamReader) -> AsyncIterator[bytes]:
+    """Yield the lines of a process, without those that are longer than a reader holds (64 KiB)."""
+    while not stream.at_eof():
+        with contextlib.suppress(ValueError):
+            if line := await stream.readline():
+                yield line
 
 
 async def run_reception(request: ReceptionRequest, say: Callable[[str], None]) -> None:
