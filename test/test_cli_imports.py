@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What each command loads before it has anything to do: few modules, and no large library."""
 
+from pathlib import Path
 import subprocess
 import sys
 
@@ -38,3 +39,15 @@ def test_a_run_loads_no_library_that_it_does_not_use() -> None:
     _, *names = done.stdout.split()
     assert 'shapely' in names
     assert not {'scipy', 'matplotlib', 'PIL', 'pandas', 'pyarrow', 'numba'} & {*names}
+
+
+def test_what_tells_of_a_recording_loads_no_scenario(tmp_path: Path) -> None:
+    """`crgame info` reads the list of topics, the game and the cycles alone."""
+    bag = str(tmp_path / 'bag')
+    offline = [sys.executable, '-m', 'crgame_ros.cli', 'offline', 'cut_in', '--duration', '0.2']
+    subprocess.run([*offline, '--record', bag], capture_output=True, check=True)
+    done = subprocess.run([sys.executable, '-c', COUNT, 'info', bag], capture_output=True,
+                          text=True, check=True)
+    _, *names = done.stdout.split()
+    assert 'mcap' in names
+    assert not {'commonroad', 'shapely', 'scipy', 'matplotlib', 'pandas', 'numba'} & {*names}

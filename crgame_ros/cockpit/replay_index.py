@@ -17,10 +17,9 @@ from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.joints import OBJECT_STATES_TOPIC, VEHICLES_TOPIC, WorldMessages
 from crgame_ros.recording.epochs import Epoch
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_cycles import CYCLE_TOPIC
 from crgame_ros.recording.standard_messages import TRAJECTORY
 from crgame_ros.recording.storage import BagMessage
-from crgame_ros.timing.cycle_rows import CycleTable
+from crgame_ros.timing.cycle_rows import CYCLE_TOPIC, CycleTable
 import numpy as np
 from numpy.typing import NDArray
 

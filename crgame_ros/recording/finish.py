@@ -14,10 +14,10 @@ from crgame_ros.recording.progress import Progress
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recorded_plans import RunReport
 from crgame_ros.recording.recover import recover
-from crgame_ros.recording.run_cycles import CYCLE_TOPIC
 from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, parts_of
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.recording.timing_report import write_timing_report
+from crgame_ros.timing.cycle_rows import CYCLE_TOPIC
 
 T = TypeVar('T')
 # Exit codes.

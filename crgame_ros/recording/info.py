@@ -12,10 +12,10 @@ from crgame_ros.game.documents import GAME
 from crgame_ros.game.game import MAX_VEHICLES
 from crgame_ros.recording.metadata import BagTopic
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_cycles import CYCLE_TOPIC
 from crgame_ros.recording.standard_messages import TABLE, TEXT
 from crgame_ros.schema.document_marks import Bounded
 from crgame_ros.schema.json_documents import JsonDocument
+from crgame_ros.timing.cycle_rows import CYCLE_TOPIC
 import numpy as np
 import numpy.typing as npt
 

@@ -21,7 +21,8 @@ from crgame_ros.messages.instrument_samples import (
 )
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_cycles import cycle_tables, CYCLE_TOPIC, table_of
+from crgame_ros.recording.run_cycles import cycle_tables, table_of
+from crgame_ros.timing.cycle_rows import CYCLE_TOPIC
 import numpy as np
 from numpy.typing import NDArray
 

@@ -24,7 +24,6 @@ from crgame_ros.messages.joints import (
 from crgame_ros.messages.status_values import Status
 from crgame_ros.recording.exceptions import RecordingError
 from crgame_ros.recording.metadata import METADATA_FILE, TopicQos
-from crgame_ros.recording.run_cycles import CYCLE_TOPIC
 from crgame_ros.recording.run_folder import BAG, GAME_FILE
 from crgame_ros.recording.standard_messages import (
     clock_bytes,
@@ -37,7 +36,7 @@ from crgame_ros.recording.writer import BagWriter
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.simulation.run_messages import stop_reason, stop_status
 from crgame_ros.simulation.run_texts import describe_game, document_texts, state_text, state_values
-from crgame_ros.timing.cycle_rows import CycleRows, CYCLES
+from crgame_ros.timing.cycle_rows import CYCLE_TOPIC, CycleRows, CYCLES
 from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.timing.time_controller import Cycle
 from crgame_ros.vehicle.state import VehicleState

@@ -12,11 +12,10 @@ from crgame_ros.messages.cdr import aligned, LITTLE_ENDIAN
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.standard_messages import TABLE
-from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS, CycleTable
+from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS, CYCLE_TOPIC, CycleTable
 import numpy as np
 from numpy.typing import NDArray
 
-CYCLE_TOPIC = '/timing/cycle'
 _FEW_CYCLES = 10
 
 FloatArray = NDArray[np.float64]

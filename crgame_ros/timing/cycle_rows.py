@@ -23,8 +23,8 @@ LATE_COLUMNS = (*(f'late_{cause}_s' for cause in Causes._fields), 'late_in')
 STEADY = 'steady_s'
 # Earlier versions had the first four, then no `put_back`.
 COMMAND_COLUMNS = ('throttle', 'brake', 'steering', 'reverse', 'lights', 'put_back')
-# Label of the first dimension of the message.
-CYCLES = 'cycles'
+# Topic of the message, and the label of its first dimension.
+CYCLE_TOPIC, CYCLES = '/timing/cycle', 'cycles'
 # No number of timing is larger, in seconds, steps or counts.
 LARGEST = 1e12
 # Their first columns in a row.
@@ -123,7 +123,7 @@ class CycleTable:
         columns = label.split(',')
         missing = [name for name in TIMING_COLUMNS if name not in columns]
         if missing or len(data) % len(columns):
-            raise InputError('has other columns: ' + ', '.join(columns)[:200], '/timing/cycle',
+            raise InputError('has other columns: ' + ', '.join(columns)[:200], CYCLE_TOPIC,
                              'record with this version')
         return cls(columns, np.array(data, dtype=np.float64).reshape(-1, len(columns)))
 
@@ -172,7 +172,7 @@ class CycleTable:
         """
         names = [f'{vehicle_id}/{name}' for name in COMMAND_COLUMNS]
         if names[0] not in self._place:
-            raise InputError(f'{vehicle_id} took no part', '/timing/cycle',
+            raise InputError(f'{vehicle_id} took no part', CYCLE_TOPIC,
                              'choose one of the vehicles of this recording')
         recorded = [name for name in names if name in self._place]
         found = self.rows[:, [self._place[name] for name in recorded]]

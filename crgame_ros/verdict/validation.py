@@ -5,7 +5,6 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 import json
-import math
 from pathlib import Path
 import re
 
@@ -185,7 +184,8 @@ def _tables(path: Path, _progress: Progress | None) -> FileVerdict:
 
 
 def _journal(path: Path, _progress: Progress | None) -> FileVerdict:
-    """Check that each whole line is an entry with its time; the first begins the session."""
+    """Check that each whole line is an entry, as a session reads it; the first begins it."""
+    from crgame_ros.study.session_journal import read_entry, SessionEvent
     text = read_text(path, 'journal', max_bytes=_LONGEST_JOURNAL)
     faults, count = [], 0
     lines = text.split('\n')
@@ -193,15 +193,12 @@ def _journal(path: Path, _progress: Progress | None) -> FileVerdict:
         faults.append(f'{path}: its last line was cut off; the next start of the session drops it')
     for number, line in enumerate(lines, 1):
         try:
-            entry = json.loads(line)
-            kind, at = entry['entry'], entry['at']
-            if not isinstance(kind, str) or not math.isfinite(at):
-                raise ValueError('entry or time')
-        except (ValueError, LookupError, TypeError, OverflowError, RecursionError):
-            faults.append(f'{path}: line {number} is no entry with its time')
+            entry = read_entry(line)
+        except ValueError as error:
+            faults.append(f'{path}: line {number} cannot be read as an entry ({error})')
             continue
         count += 1
-        if (number == 1) != (kind == 'begun'):
+        if (number == 1) != (entry['entry'] == SessionEvent.BEGUN):
             faults.append(f'{path}: line {number}: a session begins once, in the first line')
     if not count:
         raise InputError('holds no entry', str(path), 'name the journal of a participant')

@@ -247,7 +247,7 @@ def test_a_spoilt_journal_is_not_valid(copied: Path, capsys: pytest.CaptureFixtu
         stream.write('{"entry": "note", "at": "noon"}\n{"entry": "no')
     assert main(['validate', str(journal)]) == 2
     told = capsys.readouterr().err
-    assert 'line 7 is no entry with its time' in told and 'was cut off' in told
+    assert 'line 7 cannot be read as an entry' in told and 'was cut off' in told
 
 
 def test_long_tables_say_whose_they_are(studied: Studied) -> None:

@@ -13,7 +13,7 @@ from crgame_ros.paths import scenarios_directory, share_directory
 from crgame_ros.recording.finish import finish_run
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
-from crgame_ros.verdict.validation import FileVerdict, validate
+from crgame_ros.verdict.validation import validate
 import pytest
 
 
@@ -172,9 +172,15 @@ def test_solutions_are_checked_by_their_schema(run: Path, tmp_path: Path,
 
 def test_a_number_of_400_digits_is_no_time(tmp_path: Path) -> None:
     journal = tmp_path / 'journal.jsonl'
-    journal.write_text('{"entry": "begun", "at": 1}\n{"entry": "x", "at": 1' + 400 * '0' + '}\n')
-    assert validate(journal) == FileVerdict(
-        'journal of a session of 1 entries', (f'{journal}: line 2 is no entry with its time',))
+    begun = '{"entry": "begun", "at": 1, "participant": "P01", "place": 0, "items": []}'
+    wrong = ['{"entry": "x", "at": 1' + 400 * '0' + '}', '{"entry": "begun", "at": 1}', '[1]', '{']
+    journal.write_text('\n'.join([begun, *wrong, '']))
+    found = validate(journal)
+    assert found.kind == 'journal of a session of 1 entries'
+    assert [(f'{journal}: line {number} cannot be read as an entry' in fault, words in fault)
+            for number, (fault, words) in enumerate(zip(found.faults, (
+                'at is 1000', 'has no participant', 'is no entry', 'Expecting'), strict=True), 2)
+            ] == [(True, True)] * 4
 
 
 @pytest.mark.parametrize(('name', 'content', 'words'), [
