@@ -6,7 +6,8 @@ from collections.abc import Iterable
 import math
 from xml.sax.saxutils import escape
 
-from crgame_ros.analysis.pictures.figure_style import (
+from crgame_ros.analysis.pictures.frame_names import place_names
+from crgame_ros.analysis.pictures.palette import (
     DIVIDER_COLOUR,
     EDGE_COLOUR,
     INK,
@@ -15,7 +16,6 @@ from crgame_ros.analysis.pictures.figure_style import (
     shade,
     tint,
 )
-from crgame_ros.analysis.pictures.frame_axes import place_names
 from crgame_ros.analysis.pictures.scene_frame import SceneFrame
 import numpy as np
 from numpy.typing import NDArray

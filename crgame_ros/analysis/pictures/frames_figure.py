@@ -5,19 +5,21 @@
 from collections.abc import Sequence
 
 from crgame_ros.analysis.pictures.figure_style import (
-    AV_COLOURS,
-    HUMAN_COLOURS,
-    INK,
     new_figure,
-    OBJECT_COLOUR,
     panel_letter,
     paper_style,
-    PERSON_COLOUR,
     POINTS,
-    tint,
     WIDTHS,
 )
 from crgame_ros.analysis.pictures.frame_axes import draw_frame, PLAN_DOT, PLAN_WIDTH, TRACE_WIDTH
+from crgame_ros.analysis.pictures.palette import (
+    AV_COLOURS,
+    HUMAN_COLOURS,
+    INK,
+    OBJECT_COLOUR,
+    PERSON_COLOUR,
+    tint,
+)
 from crgame_ros.analysis.pictures.scene_frame import DOTS_S, FrameScene, SceneFrame, TRACE_S
 from crgame_ros.game.objects import Role
 from matplotlib.figure import Figure

@@ -6,14 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from crgame_ros.analysis.pictures.critical_moments import Moment
-from crgame_ros.analysis.pictures.figure_style import (
-    INK,
-    new_figure,
-    panel_letter,
-    paper_style,
-    vehicle_styles,
-    VehicleStyle,
-)
+from crgame_ros.analysis.pictures.figure_style import new_figure, panel_letter, paper_style
+from crgame_ros.analysis.pictures.palette import INK, vehicle_styles, VehicleStyle
 from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.vehicle.state import StateColumn
 from matplotlib.axes import Axes

@@ -8,10 +8,6 @@ import math
 from typing import NamedTuple
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking
-from crgame_ros.analysis.pictures.figure_style import (
-    object_colour,
-    vehicle_styles,
-)
 from crgame_ros.analysis.pictures.frame_window import (
     all_poses,
     footprints,
@@ -20,6 +16,7 @@ from crgame_ros.analysis.pictures.frame_window import (
     REACH,
     series_windows,
 )
+from crgame_ros.analysis.pictures.palette import object_colour, vehicle_styles
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.objects import ObjectDescription, Role

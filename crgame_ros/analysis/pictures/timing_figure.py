@@ -5,14 +5,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from crgame_ros.analysis.pictures.figure_style import (
-    AV_COLOURS,
-    HUMAN_COLOURS,
-    INK,
-    new_figure,
-    panel_letter,
-    paper_style,
-)
+from crgame_ros.analysis.pictures.figure_style import new_figure, panel_letter, paper_style
+from crgame_ros.analysis.pictures.palette import AV_COLOURS, HUMAN_COLOURS, INK
 from crgame_ros.timing.cycle_rows import CycleTable
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure

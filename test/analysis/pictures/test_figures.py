@@ -6,13 +6,9 @@ import csv
 from io import StringIO
 
 from crgame_ros.analysis.pictures.critical_moments import Moment
-from crgame_ros.analysis.pictures.figure_style import (
-    AV_COLOURS,
-    figure_bytes,
-    FORMATS,
-    HUMAN_COLOURS,
-)
+from crgame_ros.analysis.pictures.figure_style import figure_bytes, FORMATS
 from crgame_ros.analysis.pictures.frames_figure import frames_figure
+from crgame_ros.analysis.pictures.palette import AV_COLOURS, HUMAN_COLOURS
 from crgame_ros.analysis.pictures.profiles_figure import ALL_PROFILES, profiles_figure
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.analysis.pictures.timing_figure import thinned, TimedRun, timing_figure
