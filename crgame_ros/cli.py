@@ -212,6 +212,7 @@ def _offline(values: argparse.Namespace) -> int:
     from crgame_ros.python_interface.offline_runs import drive
     from crgame_ros.recording.export import prepare_folder
     from crgame_ros.recording.offline_recording import check_run_folder
+    from crgame_ros.recording.progress import on_stderr
     if values.latency < 0:
         raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
     request = RunRequest(game=values.game, scenario=values.scenario, driver=values.driver,
@@ -228,9 +229,8 @@ def _offline(values: argparse.Namespace) -> int:
         prepare_folder(values.out)
     if values.record is not None:
         check_run_folder(values.record)
-    say = partial(print, file=sys.stderr, flush=True)
     with naming(request):
-        run = drive(setup.loaded.benchmark_id, setup, values.latency, values.trigger, say,
+        run = drive(setup.loaded.benchmark_id, setup, values.latency, values.trigger, on_stderr,
                     keep_messages=values.record is not None)
     print(json.dumps(run.summary(), indent=2))
     if count := run.result.taken_off:
@@ -242,20 +242,20 @@ def _offline(values: argparse.Namespace) -> int:
     if values.record is not None:
         print(f'recording: {run.save_recording(values.record)}', file=sys.stderr)
     assert run.outcome is not None
-    return tell_outcome(say, run.outcome, run.usual_criticality, scores=run.drive_scores)
+    return tell_outcome(on_stderr, run.outcome, run.usual_criticality, scores=run.drive_scores)
 
 
 def _convert(values: argparse.Namespace) -> int:
     from crgame_ros.recording.conversion import convert, convert_to_openscenario
     from crgame_ros.recording.export import prepare_folder
-    from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.progress import on_stderr, Progress
     from crgame_ros.recording.run_formats import chosen_format, OPENSCENARIO
     ending = chosen_format(values.out, values.format)
     if values.road is not None and ending != OPENSCENARIO:
         raise InputError('is for OpenSCENARIO', '--road', 'give --format openscenario as well')
     if values.out is not None:
         prepare_folder(values.out)
-    progress = Progress(partial(print, file=sys.stderr), f'reading {values.bag}')
+    progress = Progress(on_stderr, f'reading {values.bag}')
     if ending == OPENSCENARIO:
         path, notices = convert_to_openscenario(values.bag, values.out, values.epoch, progress,
                                                 values.road)
@@ -269,10 +269,9 @@ def _convert(values: argparse.Namespace) -> int:
 
 
 def _recover(values: argparse.Namespace) -> int:
-    from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.progress import on_stderr, Progress
     from crgame_ros.recording.recover import recover
-    report = recover(values.bag, Progress(partial(print, file=sys.stderr),
-                                          f'finishing {values.bag}'))
+    report = recover(values.bag, Progress(on_stderr, f'finishing {values.bag}'))
     if report.changed:
         print(f'{report.path}: {report.messages} messages over {report.duration_s:.1f} s kept, '
               f'{report.bytes_dropped} unreadable bytes dropped')

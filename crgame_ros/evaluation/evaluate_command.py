@@ -5,7 +5,6 @@
 import argparse
 from collections.abc import Callable
 from datetime import datetime
-from functools import partial
 import json
 from pathlib import Path
 import sys
@@ -124,23 +123,22 @@ def run_command(values: argparse.Namespace) -> int:
     from crgame_ros.evaluation.dask_cluster import require_dask
     from crgame_ros.evaluation.evaluation import evaluate
     from crgame_ros.evaluation.progress import EvaluationProgress
-    from crgame_ros.recording.progress import Progress
-    say = partial(print, file=sys.stderr, flush=True)
+    from crgame_ros.recording.progress import on_stderr, Progress
     if values.cell or values.summary:
         return _inspect(values)
     require_dask()
     plan, folder = _plan(values)
     try:
         tally = evaluate(plan, folder, _computing(values), EvaluationProgress(),
-                         Progress(say, 'loading what the plan names'))
+                         Progress(on_stderr, 'loading what the plan names'))
     except KeyboardInterrupt:
-        say('\nstopped: what was finished is kept; the same command goes on')
+        on_stderr('\nstopped: what was finished is kept; the same command goes on')
         raise
     if tally.put_away:
-        say(f'note: {tally.put_away} cells that were there are not of this plan, or of other '
-            f'code: they are in {folder / "earlier"}')
+        on_stderr(f'note: {tally.put_away} cells that were there are not of this plan, or of '
+                  f'other code: they are in {folder / "earlier"}')
     if tally.before == tally.total:
-        say(f'all {tally.total} cells were finished before')
+        on_stderr(f'all {tally.total} cells were finished before')
     print(folder)
     return 0
 
@@ -152,7 +150,8 @@ def _inspect(values: argparse.Namespace) -> int:
                          '--cell' if values.cell else '--summary',
                          'give it first: crgame evaluate evaluations/NAME --summary')
     if values.cell:
-        print(report_cell(values.plan, values.cell, partial(print, file=sys.stderr, flush=True)))
+        from crgame_ros.recording.progress import on_stderr
+        print(report_cell(values.plan, values.cell, on_stderr))
         return 0
     code = summarise_command(values.plan, values)
     grid = EvaluationFolder(values.plan).grid() if (values.plan / GRID_FILE).exists() else None

@@ -3,7 +3,6 @@
 """`crgame reproduce`: repeat a paper's evaluation, and check the expected results."""
 
 import argparse
-from functools import partial
 import gc
 import math
 from pathlib import Path
@@ -51,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def reproduce(values: argparse.Namespace) -> int:
     """Run the experiments, write the report and print every expectation."""
     from crgame_ros.planner.registry import planner_class
+    from crgame_ros.recording.progress import on_stderr
     from crgame_ros.reproduction.commonroad_game import (
         evaluate_multi_av,
         evaluate_single_av,
@@ -64,9 +64,8 @@ def reproduce(values: argparse.Namespace) -> int:
     # Check both names before the first planner drives.
     for name in (values.idm, values.reactive):
         planner_class(name)
-    say = partial(print, file=sys.stderr, flush=True)
     request = EvaluationRequest(_make_folder(values.out), values.idm, values.reactive,
-                                not values.offline, values.duration, formats, say)
+                                not values.offline, values.duration, formats, on_stderr)
     single, multi = evaluate_single_av(request), evaluate_multi_av(request)
     timing = None
     if request.is_live:

@@ -4,7 +4,6 @@
 
 import argparse
 from collections.abc import Iterator, Sequence
-from functools import partial
 import json
 from pathlib import Path
 import sys
@@ -54,7 +53,7 @@ def submit(values: argparse.Namespace) -> int:
     """Judge the solutions, write those that are valid, and print a table."""
     from crgame_ros.analysis.scores.commonroad_costs import COSTS
     from crgame_ros.launcher.arguments import read_options
-    from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.progress import on_stderr, Progress
     from crgame_ros.submission.drives import DrivingChoice, find_drives
     from crgame_ros.submission.solution_of_run import BenchmarkChoice
     from crgame_ros.submission.submission import check_archive, judge_drives, write_archive
@@ -67,8 +66,7 @@ def submit(values: argparse.Namespace) -> int:
     choice.check()
     drives = find_drives(values.what, DrivingChoice(
         values.planner, dict(read_options(values.option)), values.vehicle, values.duration))
-    found = judge_drives(drives, choice,
-                         Progress(partial(print, file=sys.stderr, flush=True)).tell)
+    found = judge_drives(drives, choice, Progress(on_stderr).tell)
     submitted = sum(not each.fault for each in found)
     if submitted:
         write_archive(found, values.out)

@@ -138,10 +138,8 @@ def score_drives(log: RunTrajectories, *, expert: Expert | None = None,
             None if av is None else problems.get(av.planning_problem), int(driven.ks[0]), remarks,
             expert)
         if item.id in ends:
-            scheduler = log.game.scheduler
-            end_s = (int(driven.ks[-1]) - scheduler.k0) * scheduler.time_step_s
-            remarks.append(f'scored up to {end_s:.1f} s: {item.id} was then put back on its lane, '
-                           'and this jump was not driven')
+            remarks.append(f'scored up to {driven.times_s[-1]:.1f} s: {item.id} was then put back '
+                           'on its lane, and this jump was not driven')
         vehicles.append(VehicleScores(
             item.id, 'human' if item.role is Role.HUMAN else 'autonomous',
             '' if av is None else av.planner, nuplan, None, None, (plans or {}).get(item.id),

@@ -3,9 +3,7 @@
 """The commands `crgame study power`, `preregister`, `make-data`: before the first session."""
 
 import argparse
-from functools import partial
 from pathlib import Path
-import sys
 from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
@@ -79,16 +77,15 @@ def numbers_of(text: str) -> range:
 
 
 def _power(values: argparse.Namespace, study: 'StudyFile') -> 'list[list[Power]]':
-    from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.progress import on_stderr, Progress
     from crgame_ros.study.analysis.power import power_of
     counts = numbers_of(values.participants)
     if not 1 <= values.runs <= 1_000_000:
         raise InputError(f'is {values.runs}', '--runs', 'give 1 to 1000000')
     if values.seed < 0:
         raise InputError(f'is {values.seed}', '--seed', 'give 0 or more')
-    say = partial(print, file=sys.stderr, flush=True)
     return list(power_of(study, counts, values.runs, values.seed,
-                         Progress(say, 'simulating studies')))
+                         Progress(on_stderr, 'simulating studies')))
 
 
 def power_command(values: argparse.Namespace) -> int:
@@ -161,7 +158,7 @@ def make_command(values: argparse.Namespace) -> int:
 
     :raises InputError: if the folder exists, or an option is wrong.
     """
-    from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.progress import on_stderr, Progress
     from crgame_ros.study.data.made_study import make_study
     from crgame_ros.study.desk.page_markdown import pictures_of
     from crgame_ros.study.file import load_study
@@ -172,8 +169,7 @@ def make_command(values: argparse.Namespace) -> int:
         raise InputError(f'is {participants}', '--participants', f'give 1 to {_MOST}')
     if values.seed < 0:
         raise InputError(f'is {values.seed}', '--seed', 'give 0 or more')
-    say = partial(print, file=sys.stderr, flush=True)
     make_study(study, values.file, pictures_of(study), values.out, participants, values.seed,
-               values.effects, Progress(say, 'making sessions'))
+               values.effects, Progress(on_stderr, 'making sessions'))
     print(f'{values.out}: made data of {participants} participants; nobody took part')
     return 0

@@ -5,10 +5,8 @@
 import argparse
 import asyncio
 from dataclasses import replace
-from functools import partial
 import math
 from pathlib import Path
-import sys
 from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
@@ -149,7 +147,7 @@ def check_command(values: argparse.Namespace) -> int:
     :return: 1 if it should not be run in its present form.
     :raises InputError: if the file cannot be read, or names missing things.
     """
-    from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.progress import on_stderr, Progress
     from crgame_ros.study.check import check_study, length_of
     from crgame_ros.study.conduct.plan_commands import check_columns
     from crgame_ros.study.data.study_data_command import told_overdue
@@ -160,12 +158,11 @@ def check_command(values: argparse.Namespace) -> int:
     if not 0 <= values.participants <= 10_000:
         raise InputError(f'is {values.participants}', '--participants', 'give 0 to 10000')
     study = load_study(values.file)
-    say = partial(print, file=sys.stderr, flush=True)
     for line in told_overdue(study, values.out or Path('studies') / study.name):
-        say(f'warning: {line}')
-    findings = check_study(study, Progress(say, 'driving a second of each condition'))
+        on_stderr(f'warning: {line}')
+    findings = check_study(study, Progress(on_stderr, 'driving a second of each condition'))
     for finding in findings:
-        say(f'{finding.kind}: {finding.text}')
+        on_stderr(f'{finding.kind}: {finding.text}')
     if any(finding.kind == 'error' for finding in findings):
         return 1
     check_columns(study)

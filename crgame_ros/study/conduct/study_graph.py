@@ -2,14 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The graph in which participants drive: its process, links to its cockpit, its node."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 import os
 from pathlib import Path
 import signal
 import subprocess
 import sys
-from typing import Any
 
 from aiohttp import ClientError, ClientSession, ClientTimeout, CookieJar, Fingerprint
 from crgame_ros.cockpit.exposure import fingerprint
@@ -17,6 +16,7 @@ from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import EVENTS, GAME, GameDocument
 from crgame_ros.game.task_documents import TASK_LOG
+from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.processes import PARENT_VARIABLE
@@ -144,15 +144,6 @@ async def make_links(director: str, certificate: Path, drivers: int) -> tuple[st
     return tuple(links)
 
 
-def _popped(slot: PolledSubscription) -> Iterator[Any]:
-    """Yield the messages that have arrived, no more than the queue holds."""
-    for _ in range(_QUEUE):
-        message = slot.pop()
-        if message is None:
-            return
-        yield message
-
-
 class Director:
     """
     The controller of one graph. It is polled, and waits only in its coroutines.
@@ -197,8 +188,8 @@ class Director:
         self._read_clock()
         self._read_events()
         for slot in (self._diagnostics, *self._verdicts.values()):
-            for message in _popped(slot):
-                stamp_ns = from_time(message.header.stamp)
+            for message in slot.waiting(_QUEUE):
+                stamp_ns = stamp_of(message)
                 if self.game is not None and stamp_ns >= self.game.scheduler.clock_offset_ns:
                     for status in map(read_status, message.status):
                         self.status.add(status, self.time_s)
@@ -265,7 +256,7 @@ class Director:
                 self.status.add_events(events.fired, self.game.scheduler.dt_s)
 
     def _read_tasks(self) -> None:
-        for message in _popped(self._tasks):
+        for message in self._tasks.waiting(_QUEUE):
             # Another program may publish a malformed document there.
             with suppress(InputError):
                 log = TASK_LOG.read(message.data)
