@@ -31,7 +31,7 @@ SCENE = 'scene'
 # The measures of criticality, for pages.
 _MEASURES = [
     {'name': name, 'label': measure.label, 'unit': measure.symbol,
-     'worst': measure.worst, 'limit': USUAL.of(name), 'definition': measure.definition}
+     'worst': -measure.better, 'limit': USUAL.of(name), 'definition': measure.definition}
     for name, measure in MEASURED.items()]
 _EXPOSURES = [
     {'name': name, 'label': told.label, 'unit': told.symbol, 'definition': told.definition}

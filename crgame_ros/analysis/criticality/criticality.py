@@ -37,10 +37,10 @@ from crgame_ros.geometry.reference_point import (
     shifted_velocities,
     zero_for_nan,
 )
+from crgame_ros.measures import FOOTPRINTS, Measure
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import goal_lanelets
 from crgame_ros.simulation.observer import ObservedRun
-from crgame_ros.units import unit_symbol
 from crgame_ros.vehicle.state import pose_rates, StateColumn
 import numpy as np
 from numpy.typing import NDArray
@@ -50,15 +50,12 @@ FloatArray = NDArray[np.float64]
 LONGEST_S = 100.0
 
 
-class Measure(NamedTuple):
+@dataclass(frozen=True, kw_only=True)
+class PairMeasure(Measure):
     """
     A criticality measure of a pair.
 
-    :param unit: as tables write it.
-    :param worst: whether smaller (-1) or greater (1) values are more critical.
     :param undefined: the value where there is nothing to measure.
-    :param label: for people.
-    :param definition: one sentence.
     :param short: for people who know it, of the few that are plotted, compared and averaged.
     :param most: greater values count as this one in means: they result from speeds that are almost
         equal or gaps that are almost closed.
@@ -66,24 +63,16 @@ class Measure(NamedTuple):
         everybody near, from the footprints (`NearbyFootprints.approach`).
     """
 
-    unit: str
-    worst: int
+    reference_point: str = FOOTPRINTS
     undefined: float
-    label: str
-    definition: str
     short: str = ''
     most: float = math.inf
     of_leader: Callable[[Pursuit], float] | None = None
 
     @property
-    def symbol(self) -> str:
-        """Return the unit as people write it."""
-        return unit_symbol(self.unit)
-
-    @property
     def extreme(self) -> str:
         """Return the name of its most critical value."""
-        return f'{"least" if self.worst < 0 else "greatest"} {self.short}'
+        return f'{"least" if self.better > 0 else "greatest"} {self.short}'
 
     @property
     def head(self) -> str:
@@ -97,84 +86,87 @@ class Measure(NamedTuple):
 
 # In the order of the columns of `TickMeasures.values`: those of the leader come first.
 MEASURES = {
-    'gap': Measure('m', -1, math.nan, 'Gap to the leader',
-                   "from the subject's front to the leader's rear along its own path", 'gap',
-                   of_leader=lambda of: of.gap),
-    'time_gap': Measure('s', -1, math.inf, 'Time gap', "gap divided by the subject's speed",
-                        of_leader=lambda of: time_gap(of.gap, of.speed)),
-    'thw': Measure('s', -1, math.inf, 'Time headway (THW)',
-                   "time until the subject's front is where the leader's rear is now", 'THW',
-                   20.0, lambda of: time_gap(of.gap, of.speed)),
-    'ttc': Measure('s', -1, math.inf, 'Time to collision (TTC)',
-                   'gap divided by the closing speed along the path', 'TTC', 20.0,
-                   lambda of: time_to_collision(of.gap, of.speed, of.leader_speed)),
-    'ttc_a': Measure('s', -1, math.inf, 'TTC with accelerations',
-                     'the same where each keeps its acceleration until it stands',
-                     of_leader=lambda of: time_to_collision_accelerating(*of)),
-    'drac': Measure('m/s^2', 1, 0.0, 'Deceleration to avoid a crash (DRAC)',
-                    'half the squared closing speed divided by the gap', 'DRAC', 20.0,
-                    lambda of: deceleration_to_avoid_crash(of.gap, of.speed, of.leader_speed)),
-    'a_req': Measure('m/s^2', -1, 0.0, 'Required acceleration',
-                     'constant acceleration that just avoids contact',
-                     of_leader=lambda of: required_acceleration(
-                         of.gap, of.speed, of.leader_speed, of.leader_acceleration)),
-    'ttc_2d': Measure('s', -1, math.inf, 'TTC in the plane',
-                      'time until footprints touch that keep velocity and yaw'),
-    'min_distance': Measure('m', -1, math.nan, 'Distance',
-                            'distance of the footprints', 'distance'),
+    'gap': PairMeasure(
+        'm', "from the subject's front to the leader's rear along its own path",
+        label='Gap to the leader', short='gap', better=1, undefined=math.nan,
+        of_leader=lambda of: of.gap),
+    'time_gap': PairMeasure(
+        's', "gap divided by the subject's speed", label='Time gap', better=1, undefined=math.inf,
+        of_leader=lambda of: time_gap(of.gap, of.speed)),
+    'thw': PairMeasure(
+        's', "time until the subject's front is where the leader's rear is now",
+        label='Time headway (THW)', short='THW', better=1, undefined=math.inf, most=20.0,
+        of_leader=lambda of: time_gap(of.gap, of.speed)),
+    'ttc': PairMeasure(
+        's', 'gap divided by the closing speed along the path',
+        label='Time to collision (TTC)', short='TTC', better=1, undefined=math.inf, most=20.0,
+        of_leader=lambda of: time_to_collision(of.gap, of.speed, of.leader_speed)),
+    'ttc_a': PairMeasure(
+        's', 'the same where each keeps its acceleration until it stands',
+        label='TTC with accelerations', better=1, undefined=math.inf,
+        of_leader=lambda of: time_to_collision_accelerating(*of)),
+    'drac': PairMeasure(
+        'm/s^2', 'half the squared closing speed divided by the gap',
+        label='Deceleration to avoid a crash (DRAC)', short='DRAC', better=-1, undefined=0.0,
+        most=20.0,
+        of_leader=lambda of: deceleration_to_avoid_crash(of.gap, of.speed, of.leader_speed)),
+    'a_req': PairMeasure(
+        'm/s^2', 'constant acceleration that just avoids contact',
+        label='Required acceleration', better=1, undefined=0.0,
+        of_leader=lambda of: required_acceleration(
+            of.gap, of.speed, of.leader_speed, of.leader_acceleration)),
+    'ttc_2d': PairMeasure(
+        's', 'time until footprints touch that keep velocity and yaw',
+        label='TTC in the plane', better=1, undefined=math.inf),
+    'min_distance': PairMeasure(
+        'm', 'distance of the footprints', label='Distance', short='distance', better=1,
+        undefined=math.nan),
 }
 _OF_LEADER = [measure.of_leader for measure in MEASURES.values() if measure.of_leader]
 # Those that are plotted, compared and averaged.
 CHIEF = {name: measure for name, measure in MEASURES.items() if measure.short}
 COLUMN = {name: column for column, name in enumerate(MEASURES)}
 UNDEFINED = np.array([measure.undefined for measure in MEASURES.values()])
-_SENSES = np.array([float(measure.worst) for measure in MEASURES.values()])
+_SENSES = np.array([float(-measure.better) for measure in MEASURES.values()])
 
 
-class Exposure(NamedTuple):
+@dataclass(frozen=True, kw_only=True)
+class Exposure(Measure):
     """
     A measure of a vehicle over a whole run: the integral over time of a measure's excess.
 
-    :param unit: as tables write it.
-    :param label: for people, as is the definition; both may name thresholds: {ttc_s}.
-    :param definition: one sentence.
-    :param variant: how it is computed.
+    Label and definition may name thresholds: {ttc_s}.
+
     :param rate: of the most critical values of a tick, in the order of `MEASURES`, and the
         thresholds: by how much it grows in a second.
     """
 
-    unit: str
-    label: str
-    definition: str
-    variant: str
+    reference_point: str = FOOTPRINTS
+    better: int = -1
     rate: Callable[[Sequence[float], Thresholds], float]
-
-    @property
-    def symbol(self) -> str:
-        """Return the unit as people write it."""
-        return unit_symbol(self.unit)
 
     def told(self, limits: Thresholds) -> 'Exposure':
         """Return it with the thresholds in its texts."""
         numbers = {name: f'{value:g}' for name, value in limits._asdict().items()}
-        return self._replace(label=self.label.format(**numbers),
-                             definition=self.definition.format(**numbers))
+        return replace(self, label=self.label.format(**numbers),
+                       definition=self.definition.format(**numbers))
 
 
 _IN_FULL = 'each step that it is below counts in full'
 # By the name of their column.
 EXPOSURES = {
     'tet_s': Exposure(
-        's', 'Time with a TTC below {ttc_s} s (TET)', 'time with a ttc below {ttc_s} s', _IN_FULL,
-        lambda values, limits: float(values[COLUMN['ttc']] < limits.ttc_s)),
+        's', 'time with a ttc below {ttc_s} s', _IN_FULL,
+        label='Time with a TTC below {ttc_s} s (TET)',
+        rate=lambda values, limits: float(values[COLUMN['ttc']] < limits.ttc_s)),
     'tit': Exposure(
-        's^2', 'Integral of the TTC below {ttc_s} s (TIT)',
-        'integral of what the ttc is below {ttc_s} s', 'rectangles of a scenario step',
-        lambda values, limits: max(0.0, limits.ttc_s - values[COLUMN['ttc']])),
+        's^2', 'integral of what the ttc is below {ttc_s} s', 'rectangles of a scenario step',
+        label='Integral of the TTC below {ttc_s} s (TIT)',
+        rate=lambda values, limits: max(0.0, limits.ttc_s - values[COLUMN['ttc']])),
     'short_time_gap_s': Exposure(
-        's', 'Time with a time gap below {time_gap_s} s',
-        'time with a time gap below {time_gap_s} s', _IN_FULL,
-        lambda values, limits: float(values[COLUMN['time_gap']] < limits.time_gap_s)),
+        's', 'time with a time gap below {time_gap_s} s', _IN_FULL,
+        label='Time with a time gap below {time_gap_s} s',
+        rate=lambda values, limits: float(values[COLUMN['time_gap']] < limits.time_gap_s)),
 }
 
 
@@ -401,7 +393,7 @@ class Criticality:
                 if other < 0:
                     continue
                 known = found.worst.get(name)
-                if known is None or measure.worst * (value - known.value) > 0.0:
+                if known is None or measure.better * (value - known.value) < 0.0:
                     found.worst[name] = Worst(value, self.ids[other], time_s)
             found.headways.add(tick.following, values[COLUMN['ttc']])
             for name, exposure in EXPOSURES.items():

@@ -7,9 +7,9 @@ import math
 
 from crgame_ros.analysis.criticality.criticality import (
     Criticality,
-    Measure,
     MEASURES,
     most_critical,
+    PairMeasure,
     UNDEFINED,
 )
 from crgame_ros.errors import InputError
@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 CRITICALITY_TOPIC = '/criticality'
 PLACE_COLUMNS = ('epoch', 'n', 'subject', 'other')
 # The measures of a row; pet has a value at the tick at which the second vehicle has entered.
-MEASURED = MEASURES | {'pet': Measure(
-    's', -1, math.nan, 'Post-encroachment time (PET)',
-    'from one leaving the area where both ways cross to the other entering it')}
+MEASURED = MEASURES | {'pet': PairMeasure(
+    's', 'from one leaving the area where both ways cross to the other entering it',
+    label='Post-encroachment time (PET)', better=1, undefined=math.nan)}
 COLUMNS = (*PLACE_COLUMNS, *MEASURED)
 PET = COLUMNS.index('pet')
 

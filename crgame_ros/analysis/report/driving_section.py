@@ -14,10 +14,10 @@ from crgame_ros.analysis.report.section import (
     colours_of,
     filled_table,
     free,
+    measure_word,
     note,
     NOTHING,
     number,
-    plain,
     Plot,
     PlotLine,
     PlotSpan,
@@ -29,21 +29,12 @@ from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.game.objects import Role
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
-from crgame_ros.units import unit_symbol
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray
 
 # Longer times to lane crossing are not meaningful [s].
 _SHOWN_S = 10.0
-_WORDS = {
-    'speed_mean': 'Speed, mean', 'speed_sd': 'Speed, standard deviation',
-    'jerk_sd': 'Jerk, standard deviation', 'time_above_limit': 'Time above the speed limit',
-    'sdlp': 'Deviation of lateral position (SDLP)', 'lane_offset_mean': 'Offset in the lane, mean',
-    'lane_changes': 'Lane changes', 'srr_visual': 'Steering reversals, 3°',
-    'srr_cognitive': 'Steering reversals, 0.1°', 'tlc_min': 'Time to lane crossing, least',
-    'throttle_applications': 'Applications of the throttle',
-    'brake_applications': 'Applications of the brake'}
 FloatArray = NDArray[np.float64]
 
 _REVERSE = COMMAND_COLUMNS.index('reverse')
@@ -97,13 +88,10 @@ def driving_section(run: Run) -> Section | None:
 
 
 def _measures(found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
-    for name, word in _WORDS.items():
-        measure = MEASURES[name]
+    for name, measure in MEASURES.items():
         values = [each.values.get(name, math.nan) for each in found]
-        if any(map(math.isfinite, values)):
-            title = plain(f'{measure.definition}; {measure.variant}; at: {measure.reference}')
-            yield (f'<span title="{title}">{word}</span>', unit_symbol(measure.unit),
-                   *map(number, values))
+        if measure.label and any(map(math.isfinite, values)):
+            yield (measure_word(measure), measure.symbol, *map(number, values))
 
 
 def _gap(run: Run, name: str | None, gap: Neighbour | None) -> tuple[str, str]:

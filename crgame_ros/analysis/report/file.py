@@ -182,8 +182,8 @@ def _worst_of_all(run: Run, name: str) -> str:
     found = [each.worst[name] for each in run.usual_criticality.report() if name in each.worst]
     if not found:
         return NOTHING
-    sign = MEASURES[name].worst
-    worst = max(found, key=lambda each: sign * each.value)
+    better = MEASURES[name].better
+    worst = min(found, key=lambda each: better * each.value)
     if not MEASURES[name].matters(worst.value):
         return NOTHING
     critical = run.usual_criticality.thresholds.exceeded(name, worst.value)

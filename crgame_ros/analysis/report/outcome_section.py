@@ -18,10 +18,10 @@ from crgame_ros.analysis.report.section import (
     filled_table,
     free,
     marked,
+    measure_word,
     note,
     NOTHING,
     number,
-    plain,
     Plot,
     PlotLimit,
     Section,
@@ -32,7 +32,6 @@ from crgame_ros.analysis.report.section import (
 from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.units import unit_symbol
 import numpy as np
 from numpy.typing import NDArray
 
@@ -80,8 +79,7 @@ def _violations(run: Run) -> str:
 
 def _rules(run: Run) -> str:
     html = table('Traffic rules', ('vehicle', *(
-        f'<span title="{plain(f"{each.definition}; {each.variant}")}">{each.label}</span>'
-        + ('' if each.unit == '1' else f' [{unit_symbol(each.unit)}]')
+        measure_word(each) + (f' [{each.symbol}]' if each.symbol else '')
         for each in RULE_MEASURES.values())), [
             (named(run, vehicle.vehicle_id), *(
                 number(vehicle.values[name], 0 if each.is_count else 2)
@@ -150,10 +148,9 @@ def _worst(run: Run, vehicle: VehicleCriticality, limits: Thresholds) -> Iterato
         worst = vehicle.worst.get(name)
         if worst is None or name == TWICE or not measure.matters(worst.value):
             continue
-        word = f'<span title="{plain(measure.definition)}">{measure.label}</span>'
-        yield (word, marked(number(worst.value), limits.exceeded(name, worst.value)),
-               measure.symbol, named(run, worst.other),
-               moment(run, worst.time_s))
+        yield (measure_word(measure),
+               marked(number(worst.value), limits.exceeded(name, worst.value)),
+               measure.symbol, named(run, worst.other), moment(run, worst.time_s))
 
 
 def _headways(run: Run, vehicle: VehicleCriticality) -> Iterator[Sequence[str]]:

@@ -8,6 +8,7 @@ from typing import Any
 from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import (
     free,
+    measure_word,
     note,
     NOTHING,
     number,
@@ -96,9 +97,7 @@ def _rows(values: Sequence[Mapping[str, float | None]]) -> Iterator[Sequence[str
     for name, measure in SCORE_MEASURES.items():
         if all(each[name] is None for each in values):
             continue
-        title = plain(f'{measure.definition}; {measure.variant}')
-        unit = '' if measure.unit == '1' else measure.unit
-        yield (f'<span title="{title}">{_label(name)}</span>', unit,
+        yield (measure_word(measure, _label(name)), measure.symbol,
                *(_cell(name, each[name]) for each in values))
 
 

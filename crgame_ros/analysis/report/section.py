@@ -10,6 +10,7 @@ import re
 from typing import Literal, TYPE_CHECKING
 
 from crgame_ros.game.objects import Role
+from crgame_ros.measures import Measure
 import numpy as np
 from numpy.typing import NDArray
 
@@ -196,6 +197,11 @@ def filled_table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]
 def note(html: str) -> str:
     """Return a remark of lower emphasis as HTML."""
     return f'<p class="note">{html}</p>'
+
+
+def measure_word(measure: Measure, label: str = '') -> str:
+    """Return the label of a measure, or another one, which explains itself under the pointer."""
+    return f'<span title="{plain(measure.explanation)}">{label or measure.label}</span>'
 
 
 def marked(text: str, critical: bool) -> str:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.headways import Following, Headways
 from crgame_ros.analysis.rules.passed_lines import DrivenTrack, LineRules, PassedLine
+from crgame_ros.measures import FOOTPRINTS, Measure
 from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.roads.signs import SIGN_REACH
 from crgame_ros.vehicle.state import STANDING
@@ -78,51 +79,29 @@ def measure_rules(record: RunRecord, criticality: Criticality) -> tuple[VehicleR
     return tuple(found)
 
 
-class RuleMeasure(NamedTuple):
-    """
-    A measure of how a vehicle kept a traffic rule.
-
-    :param unit: as tables write it.
-    :param label: for people.
-    :param definition: one sentence.
-    :param variant: which of several usual definitions is used.
-    :param reference: the point that it is measured at.
-    :param is_count: whether it counts events.
-    :param empty: when it has no value; empty for a measure that always has one.
-    """
-
-    unit: str
-    label: str
-    definition: str
-    variant: str
-    reference: str
-    is_count: bool = False
-    empty: str = ''
-
-
 _FRONT = 'middle of the front bumper'
 _SAFE = (f'Maierhofer et al. 2020, R_G1: reaction {REACTION_S:g} s, braking {BRAKING:g} m/s^2, of '
          f'the leader {LEADER_BRAKING:g} m/s^2; up to {RECOVERY_S:g} s after a cut-in do not '
          'count; each step that it is below counts in full')
 _NO_LEADER = 'it followed no leader'
 RULE_MEASURES = {
-    'red_lights_run': RuleMeasure(
-        '1', 'Red lights run', 'times that it drove over the line of a light that was red',
+    'red_lights_run': Measure(
+        '1', 'times that it drove over the line of a light that was red',
         'the stop line, or else the end of the lanelet; red and red-yellow, not yellow', _FRONT,
-        is_count=True),
-    'stop_lines_run': RuleMeasure(
-        '1', 'Stop signs run', 'times that it drove over the line of a stop sign without a halt',
+        'Red lights run', better=-1, is_count=True),
+    'stop_lines_run': Measure(
+        '1', 'times that it drove over the line of a stop sign without a halt',
         f'a halt is a speed below {STANDING:g} m/s at most {SIGN_REACH:g} m before the stop line, '
         'or else the end of the lanelet; a light that is on overrules the sign', _FRONT,
-        is_count=True),
-    'unsafe_distance_share': RuleMeasure(
-        '1', 'Share of the time with a leader below the safe distance',
-        'share of the steps with a leader at which the gap to it was below the safe distance',
-        _SAFE, 'footprints, bumper to bumper', empty=_NO_LEADER),
-    'unsafe_distance_s': RuleMeasure(
-        's', 'Longest time below the safe distance',
+        'Stop signs run', better=-1, is_count=True),
+    'unsafe_distance_share': Measure(
+        '1', 'share of the steps with a leader at which the gap to it was below the safe distance',
+        _SAFE, FOOTPRINTS, 'Share of the time with a leader below the safe distance', better=-1,
+        empty=_NO_LEADER),
+    'unsafe_distance_s': Measure(
+        's',
         'longest time without a pause in which the gap to its leader was below the safe distance',
-        _SAFE, 'footprints, bumper to bumper', empty=_NO_LEADER),
+        _SAFE, FOOTPRINTS, 'Longest time below the safe distance', better=-1, empty=_NO_LEADER),
 }
 
 

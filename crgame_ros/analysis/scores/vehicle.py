@@ -4,7 +4,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.scenario import ScenarioID
@@ -12,6 +12,7 @@ from commonroad.scenario.state import KSState
 from crgame_ros.analysis.scores.commonroad_costs import checker_version, COSTS
 from crgame_ros.analysis.scores.driven_states import goal_step
 from crgame_ros.analysis.scores.nuplan import NuplanScore
+from crgame_ros.measures import Measure
 from crgame_ros.recording.recorded_plans import PlanOutcome
 from crgame_ros.scenario.exact_values import group_outline
 import numpy as np
@@ -136,83 +137,71 @@ class PlannerScores:
                 'remarks': list(self.remarks)}
 
 
-class ScoreMeasure(NamedTuple):
-    """
-    A score.
-
-    :param label: name for people.
-    :param unit: as tables write it; 1 for a share.
-    :param definition: one sentence.
-    :param variant: which of several definitions this is.
-    :param undefined: when the score has no value; empty if it always has one.
-    """
-
-    label: str
-    unit: str
-    definition: str
-    variant: str
-    undefined: str
-
-
 _NUPLAN = 'nuplan-devkit, closed loop'
 _OURS = 'crgame_ros'
 _SHORT = 'the run has fewer than 5 time steps'
 _NO_PLANS = 'it has no planner, or its plans were not recorded'
+_GOAL = 'of a human the goal is where its drive ended'
+
+
+def _of_nuplan(label: str, definition: str, variant: str = _NUPLAN) -> Measure:
+    return Measure('1', definition, variant, label=label, better=1, empty=_SHORT)
+
+
 # nuPlan's multipliers, then what it weights.
 NUPLAN_PARTS = {
-    'no_collision_at_fault': ScoreMeasure(
-        'No collision at fault', '1',
-        '1, 0.5 after one collision at fault with an object, else 0', _NUPLAN, _SHORT),
-    'drivable_area': ScoreMeasure(
-        'On the road', '1', '1 where no corner is off the road by 0.3 m or more',
-        'road: union of the lanelets', _SHORT),
-    'driving_direction': ScoreMeasure(
-        'With the traffic', '1', '1, 0.5 from 2 m, 0 from 6 m against the lane within 1 s',
-        'steps at which the lane changes count too', _SHORT),
-    'making_progress': ScoreMeasure(
-        'Made headway', '1', '1 where progress is above 0.2', _NUPLAN, _SHORT),
-    'progress': ScoreMeasure(
-        'Progress', '1', "way along the expert's route over the expert's way, 0 to 1",
+    'no_collision_at_fault': _of_nuplan(
+        'No collision at fault', '1, 0.5 after one collision at fault with an object, else 0'),
+    'drivable_area': _of_nuplan(
+        'On the road', '1 where no corner is off the road by 0.3 m or more',
+        'road: union of the lanelets'),
+    'driving_direction': _of_nuplan(
+        'With the traffic', '1, 0.5 from 2 m, 0 from 6 m against the lane within 1 s',
+        'steps at which the lane changes count too'),
+    'making_progress': _of_nuplan('Made headway', '1 where progress is above 0.2'),
+    'progress': _of_nuplan(
+        'Progress', "way along the expert's route over the expert's way, 0 to 1",
         'without an expert: over that of a free drive at the speed limit; 1 where the expert has '
-        'no route', _SHORT),
-    'time_to_collision': ScoreMeasure(
-        'Kept its distance', '1',
-        '1 where it is always above 0.95 s, sampled each 0.1 s within 3 s', _NUPLAN, _SHORT),
-    'speed_limit': ScoreMeasure(
-        'Kept the speed limit', '1', '1 - mean excess / 2.23 m/s, 0 at least',
-        f'{_NUPLAN}; 1 where no limit is known', _SHORT),
-    'comfort': ScoreMeasure(
-        'Comfort', '1', '1 where accelerations, jerks and yaw are within bounds',
-        'derivatives of speed and yaw', _SHORT)}
+        'no route'),
+    'time_to_collision': _of_nuplan(
+        'Kept its distance', '1 where it is always above 0.95 s, sampled each 0.1 s within 3 s'),
+    'speed_limit': _of_nuplan(
+        'Kept the speed limit', '1 - mean excess / 2.23 m/s, 0 at least',
+        f'{_NUPLAN}; 1 where no limit is known'),
+    'comfort': _of_nuplan(
+        'Comfort', '1 where accelerations, jerks and yaw are within bounds',
+        'derivatives of speed and yaw')}
 SCORE_MEASURES = {
-    'nuplan_score': ScoreMeasure(
-        'nuPlan score, of 1', '1', 'product of the multipliers times the weighted mean', _NUPLAN,
-        _SHORT),
+    'nuplan_score': _of_nuplan(
+        'nuPlan score, of 1', 'product of the multipliers times the weighted mean'),
     **NUPLAN_PARTS,
-    **{name: ScoreMeasure(f'CommonRoad cost {name}', '1', f'CommonRoad cost {name} as '
-                          f'docs/scores.md has it: {cost.definition}', cost.variant,
-                          'the checker finds no lane or lacks a state')
+    **{name: Measure(
+        '1', f'CommonRoad cost {name} as docs/scores.md has it: {cost.definition}', cost.variant,
+        label=f'CommonRoad cost {name}', better=-1,
+        empty='the checker finds no lane or lacks a state')
        for name, cost in COSTS.items()},
-    'valid': ScoreMeasure(
-        'Valid solution', '', 'whether all checks of valid_solution are passed',
-        'road: union of the lanelets; of a human the goal is where its drive ended', ''),
-    'feasible': ScoreMeasure(
-        'Feasible', '', 'whether the model KS can make every transition',
-        'the checker, 2 cm and 0.03 rad, at 0.1 s', 'the checker was not available'),
-    'accepted_share': ScoreMeasure(
-        'Plans accepted that are no braking plans', '1',
-        'answers accepted that are no fallback, of all answers',
-        _OURS, f'{_NO_PLANS}, or it never answered'),
-    'latency_ms': ScoreMeasure(
-        'Latency of plans, median', 'ms', 'time from a request to its plan', _OURS, _NO_PLANS),
-    'age_ms': ScoreMeasure(
-        'Age of the plan in use, median', 'ms',
-        'age of the plan in use, sampled once a second', _OURS, _NO_PLANS),
-    'reached_s': ScoreMeasure(
-        'Goal reached after', 's', 'time until a state first meets the goal',
-        'of a human the goal is where its drive ended', 'it never did'),
-    'last_distance_m': ScoreMeasure(
-        'Distance to the goal at the end', 'm',
-        "distance from the centre to the goal's area at the end",
-        'of a human the goal is where its drive ended', 'the goal has no position'),
+    'valid': Measure(
+        '', 'whether all checks of valid_solution are passed',
+        f'road: union of the lanelets; {_GOAL}',
+        label='Valid solution', better=1),
+    'feasible': Measure(
+        '', 'whether the model KS can make every transition',
+        'the checker, 2 cm and 0.03 rad, at 0.1 s', label='Feasible', better=1,
+        empty='the checker was not available'),
+    'accepted_share': Measure(
+        '1', 'answers accepted that are no fallback, of all answers', _OURS,
+        label='Plans accepted that are no braking plans', better=1,
+        empty=f'{_NO_PLANS}, or it never answered'),
+    'latency_ms': Measure(
+        'ms', 'time from a request to its plan', _OURS, label='Latency of plans, median',
+        better=-1, empty=_NO_PLANS),
+    'age_ms': Measure(
+        'ms', 'age of the plan in use, sampled once a second', _OURS,
+        label='Age of the plan in use, median', better=-1, empty=_NO_PLANS),
+    'reached_s': Measure(
+        's', 'time until a state first meets the goal', _GOAL, label='Goal reached after',
+        better=-1, empty='it never did'),
+    'last_distance_m': Measure(
+        'm', "distance from the centre to the goal's area at the end", _GOAL,
+        label='Distance to the goal at the end', better=-1, empty='the goal has no position'),
 }

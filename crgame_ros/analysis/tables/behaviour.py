@@ -24,10 +24,7 @@ _SINCE_START = "since the run's start"
 
 
 def _column(name: str, empty: str, prefix: str = '') -> Column:
-    """Return the column of a measure, from the measure's own definition."""
-    measure = MEASURES[name]
-    return Column(prefix + name, NUMBER, measure.unit, measure.definition, measure.reference,
-                  measure.variant, empty)
+    return Column.of(prefix + name, MEASURES[name], empty)
 
 
 def _vehicles(run: Run) -> Iterator[Row]:

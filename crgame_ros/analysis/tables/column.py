@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import json
 from typing import TYPE_CHECKING
 
+from crgame_ros.measures import Measure
 import pyarrow as pa
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ NUMBER, INTEGER, TEXT, FLAG = pa.float64(), pa.int64(), pa.string(), pa.bool_()
 # The types' names in Table Schemas.
 KINDS = {NUMBER: 'number', INTEGER: 'integer', TEXT: 'string', FLAG: 'boolean'}
 # Reference points.
-REAR_AXLE, CENTER, FOOTPRINTS = 'rear axle', 'center', 'footprints, bumper to bumper'
+REAR_AXLE, CENTER = 'rear axle', 'center'
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,7 @@ class Column:
     :param reference_point: reference point of a position or motion on the vehicle or object.
     :param variant: which of several usual definitions is used.
     :param empty: when it has no value; empty for a column that always has one.
+    :param better: whether greater (1) or smaller (-1) values are better; 0 for neither.
     :param values: the allowed values; empty for no such list.
     """
 
@@ -41,7 +43,19 @@ class Column:
     reference_point: str = ''
     variant: str = ''
     empty: str = ''
+    better: int = 0
     values: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, name: str, measure: Measure, empty: str = '') -> 'Column':
+        """
+        Return the column of a measure.
+
+        :param empty: when it has no value, if that is not only where the measure has none.
+        """
+        kind = FLAG if not measure.unit else INTEGER if measure.is_count else NUMBER
+        return cls(name, kind, measure.unit, measure.definition, measure.reference_point,
+                   measure.variant, empty or measure.empty, measure.better)
 
     @property
     def kind(self) -> str:

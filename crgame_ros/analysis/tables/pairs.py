@@ -3,6 +3,7 @@
 """The tables of criticality: the measures of each pair at each step, and crossings."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from crgame_ros.analysis.criticality.car_following_measures import NO_LEADER
 from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES, TickMeasures
@@ -11,7 +12,6 @@ from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
     Column,
     FLAG,
-    FOOTPRINTS,
     NUMBER,
     RUN,
     step_columns,
@@ -19,6 +19,7 @@ from crgame_ros.analysis.tables.column import (
     TEXT,
 )
 from crgame_ros.analysis.tables.writer import TableRows
+from crgame_ros.measures import FOOTPRINTS
 import numpy as np
 import pyarrow as pa
 
@@ -39,8 +40,8 @@ def measure_column(name: str, prefix: str = '', empty: str = '') -> Column:
     variant = '' if np.isnan(measure.undefined) else (
         f'{measure.undefined:g} where it is not defined'
         + (f' and where {NOT_THE_LEADER}' if following and not never else ''))
-    return Column(prefix + name, NUMBER, measure.unit, measure.definition, FOOTPRINTS,
-                  '' if empty else variant, empty or never)
+    return Column.of(prefix + name, replace(measure, variant='' if empty else variant),
+                     empty or never)
 
 
 PAIRS = TableDeclaration(

@@ -3,19 +3,18 @@
 """The table of driven vehicles: driver, distance, scores, and worst moments."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from crgame_ros.analysis.criticality.criticality import EXPOSURES, MEASURES
 from crgame_ros.analysis.criticality.headways import LEAST_SPEED, SHORT_S
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES
 from crgame_ros.analysis.runs.run import Run
-from crgame_ros.analysis.scores.vehicle import SCORE_MEASURES, ScoreMeasure
+from crgame_ros.analysis.scores.vehicle import SCORE_MEASURES
 from crgame_ros.analysis.tables.behaviour import VEHICLE_BEHAVIOUR
 from crgame_ros.analysis.tables.column import (
     Column,
     declare,
-    FLAG,
-    FOOTPRINTS,
     INTEGER,
     NUMBER,
     REAR_AXLE,
@@ -26,6 +25,7 @@ from crgame_ros.analysis.tables.column import (
 )
 from crgame_ros.analysis.tables.pairs import measure_column
 from crgame_ros.game.documents import DrivenAv, DrivenHuman
+from crgame_ros.measures import FOOTPRINTS, Measure
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 
@@ -54,9 +54,7 @@ def _rules(run: Run) -> Iterator[Row]:
 
 
 VEHICLE_RULES = TablePart(tuple(
-    Column(name, INTEGER if measure.is_count else NUMBER, measure.unit, measure.definition,
-           measure.reference, measure.variant, measure.empty)
-    for name, measure in RULE_MEASURES.items()), _rules)
+    Column.of(name, measure) for name, measure in RULE_MEASURES.items()), _rules)
 
 
 # By column, the score; ages and latencies of plans are in columns of their own.
@@ -66,11 +64,8 @@ _SCORES = {'score_nuplan': 'nuplan_score', **{
 _AGE = SCORE_MEASURES['age_ms']
 
 
-def _score_column(name: str, measure: ScoreMeasure) -> Column:
-    return Column(
-        name, NUMBER if measure.unit else FLAG, measure.unit, measure.definition,
-        variant=measure.variant,
-        empty=f'{measure.undefined}, or {NOT_SCORED}' if measure.undefined else NOT_SCORED)
+def _score_column(name: str, measure: Measure) -> Column:
+    return Column.of(name, measure, ', or '.join(filter(None, (measure.empty, NOT_SCORED))))
 
 
 def _scores(run: Run) -> Iterator[Row]:
@@ -89,10 +84,10 @@ def _scores(run: Run) -> Iterator[Row]:
 
 VEHICLE_SCORES = TablePart((
     *(_score_column(name, SCORE_MEASURES[score]) for name, score in _SCORES.items()),
-    _score_column('score_age_p50_s', _AGE._replace(
-        unit='s', definition=f'median {_AGE.definition}')),
+    _score_column('score_age_p50_s', replace(
+        _AGE, unit='s', definition=f'median {_AGE.definition}')),
     Column('score_expert', TEXT, '', 'with whose progress it was compared: scores with different '
-           'experts are not comparable', empty=f'{SCORE_MEASURES["progress"].undefined}, or '
+           'experts are not comparable', empty=f'{SCORE_MEASURES["progress"].empty}, or '
            f'{NOT_SCORED}'),
     Column('score_failed_checks', TEXT, '', 'names of the checks of valid_solution that it fails',
            variant='docs/scores.md', empty=f'all are passed, or {NOT_SCORED}')), _scores)
@@ -216,8 +211,7 @@ VEHICLE_PARTS = (
         Column('max_inverse_ttc', NUMBER, '1/s', 'greatest 1 / ttc; 0 if it never approached a '
                'leader, so that means over vehicles count it', FOOTPRINTS,
                f'a ttc below {LEAST_TTC_S:g} s, as in a contact, counts as {LEAST_TTC_S:g} s'),
-        *(Column(name, NUMBER, each.unit, each.told(USUAL).definition, FOOTPRINTS, each.variant)
-          for name, each in EXPOSURES.items()),
+        *(Column.of(name, each.told(USUAL)) for name, each in EXPOSURES.items()),
         Column('crossings', INTEGER, '1', 'rows of crossings with it'),
         Column('worst_pet_s', NUMBER, 's', 'least post-encroachment time', FOOTPRINTS,
                empty='it crossed no other path')), _criticality),

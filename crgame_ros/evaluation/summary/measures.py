@@ -7,7 +7,6 @@ import math
 from typing import Literal, NamedTuple
 
 from crgame_ros.analysis.criticality.criticality import CHIEF, EXPOSURES
-from crgame_ros.analysis.criticality.criticality import MEASURES as CRITICALITY
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES as RULES
 from crgame_ros.analysis.scores.vehicle import NUPLAN_PARTS
@@ -132,20 +131,21 @@ MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('feasible', 'AVs with a feasible drive', 'score_feasible', 1, 'true'),
     SummaryMeasure('nuplan', 'nuPlan score', 'score_nuplan', 1),
     # Whether it made headway is told by its progress.
-    *(SummaryMeasure(name, f'nuPlan: {part.label.lower()}', f'score_{name}', 1)
+    *(SummaryMeasure(name, f'nuPlan: {part.label.lower()}', f'score_{name}', part.better)
       for name, part in NUPLAN_PARTS.items() if name != 'making_progress'),
     # All AVs count in its mean; in that of the least TTC only those that approached a leader.
     SummaryMeasure('inverse_ttc', 'greatest 1/TTC', 'max_inverse_ttc', -1, least=0.001),
-    *(SummaryMeasure(f'worst_{name}', each.extreme, f'worst_{name}', -each.worst,
+    *(SummaryMeasure(f'worst_{name}', each.extreme, f'worst_{name}', each.better,
                      what=_OF_WHOM.get(name, ''), most=each.most)
       for name, each in CHIEF.items()),
     SummaryMeasure('time_gap', 'median time gap', 'time_gap_median_s', 1),
     SummaryMeasure('time_gap_below_1s', 'time with a time gap below 1 s', 'time_gap_below_1s',
                    -1),
     SummaryMeasure('worst_pet_s', 'least PET', 'worst_pet_s', 1),
-    *(SummaryMeasure(name, each.told(USUAL).definition, name, -1)
+    *(SummaryMeasure(name, each.told(USUAL).definition, name, each.better)
       for name, each in EXPOSURES.items()),
-    *(SummaryMeasure(name, each.label[:1].lower() + each.label[1:], name, -1)
+    *(SummaryMeasure(name, each.label[:1].lower() + each.label[1:], name,
+                     each.better)
       for name, each in RULES.items()),
     SummaryMeasure('distance', 'way', 'distance', 0),
     SummaryMeasure('mean_speed', 'mean speed', 'mean_speed', 0),
@@ -194,7 +194,5 @@ def chosen_measures(names: Sequence[str] | None, known: Iterable[str]
 
 def better_of(name: str) -> int:
     """Return 1 if greater values of a measure or column are better, -1 if smaller ones, or 0."""
-    if name in MEASURES:
-        return MEASURES[name].better
-    measure = CRITICALITY.get(name.removeprefix('worst_'))
-    return -measure.worst if measure is not None and name.startswith('worst_') else 0
+    found = MEASURES.get(name) or _NUMERIC.get(name)
+    return found.better if found else 0

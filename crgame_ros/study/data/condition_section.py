@@ -18,11 +18,11 @@ from crgame_ros.analysis.report.section import (
     tick_text,
 )
 from crgame_ros.analysis.tables.column import Column, NUMBER
+from crgame_ros.measures import unit_symbol
 from crgame_ros.study.analysis.planned_tests import participant_means
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.trials_table import measure_columns, TASK_COLUMNS
 from crgame_ros.study.trial_plan import conditions_of
-from crgame_ros.units import unit_symbol
 import numpy as np
 from numpy.typing import NDArray
 
@@ -358,11 +358,11 @@ def _row(shown: ShownMeasure) -> Sequence[str]:
     count = f'{len(shown.means.used)}*' if shown.means.within else ' / '.join(
         str(len(each.points)) for each in shown.means.conditions)
     return (f'{plain(shown.column.name)}<br><small>{plain(shown.column.definition)}</small>',
-            plain(_unit(shown.column)), *cells, count)
+            plain(unit_symbol(shown.column.unit)), *cells, count)
 
 
 def _figure(shown: ShownMeasure) -> str:
-    unit = _unit(shown.column)
+    unit = unit_symbol(shown.column.unit)
     words = shown.column.name
     told = f' <span class="unit">[{plain(unit)}]</span>' if unit else ''
     return (f'<figure class="chart"><figcaption>{plain(words)}{told}</figcaption>'
@@ -372,10 +372,6 @@ def _figure(shown: ShownMeasure) -> str:
 def _differs(means: ConditionMeans) -> bool:
     """Return whether a plot would show any difference."""
     return len({value for each in means.conditions for value in each.points.values()}) > 1
-
-
-def _unit(column: Column) -> str:
-    return '' if column.unit == '1' else unit_symbol(column.unit)
 
 
 def _digits(value: float) -> int:

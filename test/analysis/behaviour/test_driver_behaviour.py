@@ -80,7 +80,7 @@ def test_the_data_dictionary_is_whole() -> None:
     assert sorted(MEASURES) == sorted([*OF_VEHICLES, *OF_OTHERS])
     for each in MEASURES.values():
         assert each.unit in ('1', 's', 'm', 'm/s', 'm/s^2', 'm/s^3', '1/min')
-        assert each.definition and each.variant and each.reference
+        assert each.definition and each.variant and each.reference_point
         assert each.per in ('vehicle', 'event', 'lane change', 'take-over', 'step')
 
 
