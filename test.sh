@@ -25,6 +25,8 @@ called_from=$PWD
 cd -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")"
 export CRGAME_DEVELOP=1
 source scripts/env.sh
+# The installed copy runs what is compiled for the checkout.
+export NUMBA_CACHE_DIR=$PWD/crgame_ros/traffic/__pycache__
 # When pytest first collects the tests it rewrites all their assertions: once, beside the compiler,
 # instead of in each of its workers.
 [[ -d test/__pycache__ ]] || "$CRGAME_PYTHON" -m pytest --collect-only -qq >/dev/null 2>&1 &

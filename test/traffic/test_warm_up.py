@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 
+from crgame_ros.traffic.changing.courtesy import relief_at_change
 from crgame_ros.traffic.compiling import kernel_cache
 import pytest
 
@@ -35,8 +36,12 @@ for path in sys.argv[2:]:
     drive(Path(path), TrafficSpec(recorded='reactive', agents=30, flow=600.0), 25.0)
 print(json.dumps([len(before), {x: n for x, n in count().items() if n != before[x]}]))
 """
-
-
+COPY = """
+from crgame_ros.traffic.changing import courtesy
+courtesy.relief_at_change(10.0, 20.0)
+stats = courtesy.relief_at_change.stats
+print(courtesy.__file__, sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+"""
 HOLDING = """
 import fcntl, os, sys, time
 lock = open(sys.argv[1], 'a')
@@ -79,6 +84,21 @@ def test_what_is_compiled_in_names_the_cache(file: str, tmp_path: Path,
         changed.write('# Changed.\n')
     assert kernel_cache.digest.__wrapped__(WAITING) != before
     assert kernel_cache.digest.__wrapped__(LANE_TABLE) == kernel_cache.digest(LANE_TABLE)
+
+
+def test_a_copy_elsewhere_loads_what_is_compiled(tmp_path: Path) -> None:
+    """As colcon installs one: the place of the sources is in no name of the cache."""
+    relief_at_change(10.0, 20.0)
+    package = Path(kernel_cache.__file__).parents[2]
+    shutil.copytree(package, tmp_path / package.name,
+                    ignore=shutil.ignore_patterns('__pycache__'))
+    done = subprocess.run(
+        [sys.executable, '-c', COPY], capture_output=True, text=True, timeout=240, cwd=tmp_path,
+        env=os.environ | {'NUMBA_CACHE_DIR': str(kernel_cache.cache_root()),
+                          'PYTHONPATH': f'{tmp_path}:{os.environ.get("PYTHONPATH", "")}'})
+    file, *counts = done.stdout.split()
+    assert Path(file).is_relative_to(tmp_path), done.stderr
+    assert counts == ['1', '0']
 
 
 @pytest.mark.exhaustive

@@ -2,27 +2,50 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compilation of the loops over agents with numba and a cache on disk."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, cast, TypeVar
 
 from crgame_ros.traffic.compiling.kernel_cache import cache_root, digest
 import numba
+from numba.core.caching import UserProvidedCacheLocator
 import numpy as np
 from numpy.typing import NDArray
 
 Function = TypeVar('Function', bound=Callable[..., object])
 
 
+class InDigestFolder(UserProvidedCacheLocator):
+    """
+    A cache whose files have no path in their names, unlike numba's own.
+
+    Checkouts, installed copies, and folders that are moved share what is compiled.
+    """
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file: str) -> str:
+        return ''
+
+
+@contextmanager
+def _cached(function: Callable[..., object]) -> Iterator[None]:
+    """Choose the cache of a function. It stays as it was for those of others."""
+    config = vars(numba.config)
+    ours = {'CACHE_DIR': str(cache_root() / f'compiled-{digest(function.__module__)}'),
+            'CACHE_LOCATOR_CLASSES': f'{__name__}.{InDigestFolder.__name__}'}
+    before = {name: config[name] for name in ours}
+    config.update(ours)
+    try:
+        yield
+    finally:
+        config.update(before)
+
+
 def vectorized(function: Callable[..., float]) -> Callable[..., NDArray[np.float64]]:
     """Compile a function of numbers [float64] into one of arrays that broadcast."""
-    _choose_cache(function)
     count = function.__code__.co_argcount
-    return numba.vectorize([numba.float64(*[numba.float64] * count)], cache=True)(function)
-
-
-def _choose_cache(function: Callable[..., object]) -> None:
-    folder = cache_root() / f'compiled-{digest(function.__module__)}'
-    vars(numba.config)['CACHE_DIR'] = str(folder)
+    with _cached(function):
+        return numba.vectorize([numba.float64(*[numba.float64] * count)], cache=True)(function)
 
 
 def inlined(function: Function) -> Function:
@@ -32,14 +55,13 @@ def inlined(function: Function) -> Function:
     It is meant for small functions in inner loops: a call passes tables by value, which are some
     hundred words.
     """
-    _choose_cache(function)
     return cast(Function, numba.njit(error_model='numpy', inline='always')(function))
 
 
 def compiled(function: Function) -> Function:
     """Compile a function of numbers and arrays; divisions by zero give inf and NaN, as numpy's."""
-    _choose_cache(function)
-    return _once(numba.njit(cache=True, error_model='numpy')(function))
+    with _cached(function):
+        return _once(numba.njit(cache=True, error_model='numpy')(function))
 
 
 def bare(function: Function) -> Function:
@@ -49,10 +71,10 @@ def bare(function: Function) -> Function:
     numba counts references to each array of a table wherever the table is used. That takes more
     time than the rest of a short loop.
     """
-    _choose_cache(function)
     # numba does not document `_nrt`.
     options: dict[str, Any] = {'cache': True, 'error_model': 'numpy', '_nrt': False}
-    return _once(numba.njit(**options)(function))
+    with _cached(function):
+        return _once(numba.njit(**options)(function))
 
 
 def _once(dispatcher: Any) -> Any:
