@@ -135,9 +135,8 @@ class _OfflineMessages:
         self._object_names = tuple(name for item in setup.obstacles.descriptions
                                    for name in object_joint_names(item.id))
         self._rows = CycleRows(setup.vehicle_ids, self._every)
-        # (n + 1, V, 6), and whether somebody drove each AV.
-        self._commands = np.concatenate((result.commands, result.av_commands), axis=1)
-        self._taken_over = np.isfinite(result.av_commands[..., 0])
+        # (n + 1, V)
+        self._driven = np.isfinite(result.commands[..., 0])
         self._said: dict[int, list[tuple[str, _Content]]] = defaultdict(list)
         self._collect()
 
@@ -195,7 +194,7 @@ class _OfflineMessages:
 
     def _seats(self, n: int) -> list[_Sent]:
         """Return who drives, at the beginning and where a recording takes an AV over or leaves."""
-        taken_over = self._taken_over
+        taken_over = self._driven[:, len(self._setup.humans):]
         if n > 1 and np.array_equal(taken_over[n], taken_over[n - 1]) or n == 1 \
                 and not taken_over[1].any():
             return []
@@ -226,17 +225,16 @@ class _OfflineMessages:
             at_s = n * dt_s
             rows.add(0, self._scheduler.k(n), Cycle(
                 n, at_s, at_s, 0.0, 0.0, self._interval_s(n), 0, 0.0), 0.0, dt_s,
-                self._commands[n])
+                self._result.commands[n])
         if not rows.count or not (rows.full or last):
             return []
         return [(CYCLE_TOPIC, table_bytes(CYCLES, rows.label, rows.taken()))]
 
     def _interval_s(self, n: int) -> float:
         """Return Delta t_eff of the step to n: nominal if nobody drove by hand [s]."""
-        driven = [True] * len(self._setup.humans) + self._taken_over[n].tolist()
-        column = next((index for index, drove in enumerate(driven) if drove), None)
-        return self._scheduler.dt_s if column is None \
-            else float(self._result.intervals_s[n, column])
+        driven = np.flatnonzero(self._driven[n])
+        return float(self._result.intervals_s[n, driven[0]]) if len(driven) \
+            else self._scheduler.dt_s
 
 
 def _point(stamp_ns: int, names: Sequence[str], *values: NDArray[np.float64]) -> bytes:

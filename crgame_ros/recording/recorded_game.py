@@ -141,12 +141,9 @@ def recorded_inputs(setup: Setup) -> RecordedInputs:
 def inputs_of(result: OfflineResult) -> RecordedInputs:
     """Return the inputs of an offline run's humans, and of drivers who took over its AVs."""
     # No step consumed row 0.
-    drivers = {human.id: ReplayDriver(result.commands[1:, place])
-               for place, human in enumerate(result.setup.humans)}
-    drivers.update({av.id: ReplayDriver(result.av_commands[1:, place])
-                    for place, av in enumerate(result.setup.avs)
-                    if np.isfinite(result.av_commands[1:, place, 0]).any()})
-    return RecordedInputs(drivers, result.intervals_s[1:, 0])
+    commands = dict(zip(result.setup.vehicle_ids, result.commands[1:].swapaxes(0, 1), strict=True))
+    return RecordedInputs({name: ReplayDriver(given) for name, given in commands.items()
+                           if np.isfinite(given[:, 0]).any()}, result.intervals_s[1:, 0])
 
 
 def _recorded_in(bag: Path, setup: Setup) -> GameDocument:

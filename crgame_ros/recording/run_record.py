@@ -244,6 +244,5 @@ def record_of_log(path: Path, log: RunTrajectories) -> RunRecord:
 
 def run_record_of(result: OfflineResult) -> RunRecord:
     """Return the record of an offline run."""
-    commands = np.concatenate((result.commands, result.av_commands), axis=1)[1:]
-    return RunRecord(trajectories_of(result), np.arange(1, len(result.commands)), commands,
-                     result.fired, tasks=result.tasks)
+    return RunRecord(trajectories_of(result), np.arange(1, len(result.commands)),
+                     result.commands[1:], result.fired, tasks=result.tasks)

@@ -336,4 +336,4 @@ def trajectories_of(result: OfflineResult) -> RunTrajectories:
         setup.loaded.xml_text, game, setup.descriptions, ks, states, result.vehicle_states[ticks],
         result.object_poses[:len(ks)].reshape(len(ks), -1, 3),
         result.object_velocities[:len(ks)].reshape(len(ks), -1, 3), tuple(map(one_line, notices)),
-        commands=np.concatenate((result.commands, result.av_commands), axis=1)[ticks])
+        commands=result.commands[ticks])

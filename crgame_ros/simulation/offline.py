@@ -3,7 +3,7 @@
 """The offline runner: the same engine on a virtual clock, planners in lockstep."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from crgame_ros.control.tracked_execution import TrackingErrors
 from crgame_ros.drivability.monitor import VehicleDrivability
@@ -26,7 +26,7 @@ from crgame_ros.simulation.plan_requests import request_topic
 from crgame_ros.simulation.run_messages import MessageLog, refusal_status, RunMessage
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.publishing import steps_between_messages
-from crgame_ros.vehicle.driver_command import COMMAND_WIDTH, DriverCommand, RELEASED
+from crgame_ros.vehicle.driver_command import COMMAND_WIDTH
 from crgame_ros.vehicle.state import STATE_WIDTH
 import numpy as np
 from numpy.typing import NDArray
@@ -94,8 +94,9 @@ class OfflineResult:
     :param vehicle_states: (n + 1, V, 8) states of humans, then AVs, at every step.
     :param object_poses: (ticks, M, 3) centre poses at every tick.
     :param object_velocities: (ticks, M, 3) their derivatives.
-    :param commands: (n + 1, H, 6) throttle, brake, steering, reverse, lights and put_back; row i
-        was consumed by the step that led to state i, row 0 by none.
+    :param commands: (n + 1, V, 6) throttle, brake, steering, reverse, lights and put_back that the
+        step to each state consumed; row 0 is NaN, and so are those of AVs, except for the lights,
+        while no driver had taken them over.
     :param intervals_s: (n + 1, V) interval over which each vehicle was moved in that step: Delta
         t_eff if a driver has it, else the nominal step [s]
     :param planners: the results of each AV's planner.
@@ -103,8 +104,6 @@ class OfflineResult:
     :param fired: events that took effect, in order.
     :param stop: the human's violation that ended the run, if the game stops at violations; its n
         is that of the last state.
-    :param av_commands: (n + 1, A, 6) the same commands of drivers who took over an AV; NaN, except
-        for the lights, while it followed its plan.
     :param tasks: the entries of the game's tasks, in order.
     :param taken_off: number of agents that were removed because they blocked each other.
     :param messages: what planners were asked and have answered, statuses and signals, in order;
@@ -122,8 +121,6 @@ class OfflineResult:
     violations: tuple[VehicleDrivability, ...] = ()
     fired: tuple[FiredEvent, ...] = ()
     stop: VehicleDrivability | None = None
-    av_commands: NDArray[np.float64] = field(
-        default_factory=lambda: np.empty((0, 0, COMMAND_WIDTH)))
     tasks: tuple[TaskEntry, ...] = ()
     taken_off: int = 0
     messages: tuple[RunMessage, ...] | None = None
@@ -340,10 +337,8 @@ class _Trace:
     def __init__(self, setup: Setup, steps: int, check: bool,
                  observers: Sequence[RunObserver]) -> None:
         self.vehicles = np.empty((steps + 1, len(setup.vehicle_ids), STATE_WIDTH))
-        self._humans, self._avs = len(setup.humans), len(setup.avs)
         # By step; one conversion at the end takes less time than one for each step.
-        self._commands: list[list[DriverCommand]] = []
-        self._av_commands: list[list[Sequence[float]]] = []
+        self._commands: list[list[Sequence[float]]] = []
         self.intervals_s = np.full((steps + 1, len(setup.vehicle_ids)), setup.scheduler.dt_s)
         self.objects: list[NDArray[np.float64]] = []
         self.tasks: list[TaskEntry] = []
@@ -364,15 +359,15 @@ class _Trace:
         count = simulation.n + 1
         if log is not None:
             log.add_plans()
-        commands, av_commands = (
-            np.array(rows, dtype=np.float64).reshape(count, width, COMMAND_WIDTH)
-            for rows, width in ((self._commands, self._humans), (self._av_commands, self._avs)))
+        commands = np.array(self._commands, dtype=np.float64).reshape(
+            count, -1, COMMAND_WIDTH)
+        commands[0] = np.nan
         return OfflineResult(
             simulation.setup, simulation.state_hash(), self.vehicles[:count],
             np.array(self.objects), np.array(self.object_velocities), commands,
             self.intervals_s[:count], planners,
             () if self._drivability is None else self._drivability.report(), simulation.fired,
-            self.stop, av_commands, tuple(self.tasks), simulation.taken_off,
+            self.stop, tuple(self.tasks), simulation.taken_off,
             None if log is None else tuple(log.messages))
 
     def add(self, simulation: Simulation, result: StepResult, effective_s: float) -> None:
@@ -384,10 +379,7 @@ class _Trace:
                 self.intervals_s[n, index] = effective_s
         if states := simulation.states:
             self.vehicles[n] = states
-        self._commands.append([
-            command or RELEASED for command in simulation.commands[:self._humans]])
-        if self._avs:
-            self._av_commands.append(simulation.command_rows[self._humans:])
+        self._commands.append(simulation.command_rows)
         if result.objects is not None:
             self.objects.append(result.objects.poses)
             self.object_velocities.append(result.objects.velocities)

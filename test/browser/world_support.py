@@ -53,7 +53,7 @@ class RecordedRun:
         count, vehicles, columns = result.vehicle_states.shape
         self.states: FloatArray = np.full((count, vehicles, STATE_COLUMNS), np.nan)
         self.states[:, :, :columns] = result.vehicle_states
-        self.states[:, :len(setup.humans), 8:] = result.commands[:, :, :STATE_COLUMNS - 8]
+        self.states[:, :, 8:] = result.commands[:, :, :STATE_COLUMNS - 8]
         self.objects: FloatArray = np.concatenate(
             (result.object_poses, result.object_velocities), axis=2)
 

@@ -195,7 +195,7 @@ class RunRecorder:
                 cycle = Cycle(n, n * scheduler.dt_s, n * scheduler.dt_s + lags_s[n],
                               dt_s - scheduler.dt_s, lags_s[n], dt_s, 0, 0.0)
                 rows.add(epoch, scheduler.k(n), cycle, 0.001, 0.009,
-                         [*result.commands[n], *result.av_commands[n]],
+                         result.commands[n],
                          steady_s=steady_s + n * scheduler.dt_s)
                 self.rows[n] = rows.taken()
                 found.append(('/timing/cycle', 'std_msgs/msg/Float64MultiArray', at_ns,

@@ -32,7 +32,7 @@ def test_a_recording_has_the_same_record(recorder: Any, tmp_path: Path) -> None:
         assert np.array_equal(record.commands[:, 0], result.commands[1:, 0])
         # Of a vehicle that follows a plan: the motion that others see.
         assert np.isnan(record.commands[:, 1, [0, 1, 2, 3, 5]]).all()
-        assert np.array_equal(record.commands[:, 1, 4], result.av_commands[1:, 0, 4])
+        assert np.array_equal(record.commands[:, 1, 4], result.commands[1:, 1, 4])
         assert record.fired == result.fired
         assert np.array_equal(record.log.ks, here.log.ks)
 

@@ -249,13 +249,13 @@ def test_lights_that_an_av_shows_by_itself_are_no_input(tmp_path: Path, recorder
                                                         drive: Drive) -> None:
     """An AV has commands only if and while it was driven by hand."""
     result = drive(CUT_IN, duration_s=0.3, avs=(AvSpec('av0', 'constant-velocity'),))
-    result.av_commands[:, 0, 4] = 2.0
+    result.commands[:, 1, 4] = 2.0
     alone = replay_inputs(recorder.ours(tmp_path / 'alone', recorder.messages(result)))
     assert [*alone.commands] == ['hv0']
-    result.av_commands[11:21, 0] = (0.5, 0.0, 0.1, 0.0, 1.0, 0.0)
+    result.commands[11:21, 1] = (0.5, 0.0, 0.1, 0.0, 1.0, 0.0)
     driven = replay_inputs(recorder.ours(tmp_path / 'driven', recorder.messages(result)))
     expected = np.full((30, 6), np.nan)
-    expected[10:20] = result.av_commands[11:21, 0]
+    expected[10:20] = result.commands[11:21, 1]
     np.testing.assert_array_equal(driven.commands['av0'], expected)
 
 

@@ -175,13 +175,14 @@ def test_replay_of_commands_and_intervals_is_exact(cut_in: LoadedScenario) -> No
     intervals = np.random.default_rng(51).uniform(0.0001, 0.05, 500)
     original = run_offline(setup, duration_s=5.0, drivers={'hv0': Weaving()},
                            intervals_s=intervals, check_drivability=False)
+    consumed = original.commands[1:]
     replay = run_offline(setup, duration_s=5.0, intervals_s=intervals, check_drivability=False,
-                         drivers={'hv0': ReplayDriver(original.commands[1:, 0])})
+                         drivers={'hv0': ReplayDriver(consumed[:, 0])})
     assert replay.states_of('hv0').tobytes() == original.states_of('hv0').tobytes()
     # The commands were rounded to what a message holds, and the intervals were used.
-    assert (original.commands == original.commands.astype(np.float32)).all()
+    assert (consumed == consumed.astype(np.float32)).all()
     nominal = run_offline(setup, duration_s=5.0, check_drivability=False,
-                          drivers={'hv0': ReplayDriver(original.commands[1:, 0])})
+                          drivers={'hv0': ReplayDriver(consumed[:, 0])})
     assert nominal.states_of('hv0').tobytes() != original.states_of('hv0').tobytes()
 
 

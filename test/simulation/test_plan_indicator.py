@@ -142,8 +142,8 @@ def test_turns_are_those_that_published_maps_name(shared_scenarios: Path) -> Non
 def test_run_shows_records_and_exports_it(tmp_path: Path) -> None:
     """The AV leaves the roundabout at the end of its game: the indicator gets into the file."""
     result = drive('roundabout', 20.0)
-    assert np.isnan(result.av_commands[:, 0, [0, 1, 2, 3, 5]]).all()
-    lights = result.av_commands[:, 0, 4]
+    assert np.isnan(result.commands[:, 1, [0, 1, 2, 3, 5]]).all()
+    lights = np.nan_to_num(result.commands[:, 1, 4])
     turned = np.flatnonzero(lights)
     # Once, and until the end.
     assert set(lights) == {0.0, 2.0} and np.ptp(turned) == len(turned) - 1

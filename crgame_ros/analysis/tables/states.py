@@ -132,7 +132,9 @@ class _StateRows:
         here = np.isfinite(poses[..., 0])
         ks = np.broadcast_to(log.ks[part, None], here.shape)
         who = np.broadcast_to(np.arange(here.shape[1]), here.shape)[here]
-        commands = self._commands(part, here.shape[1])
+        commands = np.full((count, here.shape[1], len(COMMAND_COLUMNS)), np.nan)
+        if log.commands is not None:
+            commands[:, :self._vehicles] = log.commands[part]
         found: dict[str, object] = {
             'run': self._run.id, 'k': ks[here],
             'time_s': self._run.seconds_at(ks[here]),
@@ -149,17 +151,6 @@ class _StateRows:
                 ('steering_rate', StateColumn.STEERING_RATE))},
             **_consumed(commands[here])}
         return found | self._lanes(poses, here)
-
-    def _commands(self, part: slice, everybody: int) -> FloatArray:
-        """Return the commands that led to each state (steps, all, 6); NaN without a command."""
-        log, record = self._run.log, self._run.record
-        found = np.full((part.stop - part.start, everybody, len(COMMAND_COLUMNS)), np.nan)
-        wanted = self._run.steps_of(log.ks[part])
-        places = np.minimum(np.searchsorted(record.ns, wanted), max(len(record.ns) - 1, 0))
-        if len(record.ns):
-            known = record.ns[places] == wanted
-            found[known, :self._vehicles] = record.commands[places[known]]
-        return found
 
     def _lanes(self, poses: FloatArray, here: NDArray[np.bool_]) -> dict[str, object]:
         """Return lanelet, arc length and lateral offset of all that are present."""

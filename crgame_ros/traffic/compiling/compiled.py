@@ -24,6 +24,7 @@ class InDigestFolder(UserProvidedCacheLocator):
 
     @classmethod
     def get_suitable_cache_subpath(cls, py_file: str) -> str:
+        """Return the folder of a file's code within the cache: the cache itself."""
         return ''
 
 
