@@ -57,7 +57,7 @@ class ChunkBuilder:
         self._steps = ticks * scheduler.steps_per_tick
         self.chunk_s = self._steps * scheduler.dt_s
         self.count = (index.last_n - index.first_n) // self._steps + 1
-        self._vehicles = [item.id for item in run.descriptions if item.role.is_ego]
+        self._vehicles = run.vehicle_ids
         self._frames = MessageFrames(run.game, run.descriptions)
         avs = [av.id for av in run.game.avs]
         self._plans = {f'/{av}/plan' for av in avs}

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The objects that can appear in a run, and their states at a scenario time step."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 import re
@@ -62,6 +63,16 @@ class ObjectDescription:
     def height(self) -> float:
         """Return the height that is usual for the type [m]."""
         return HEIGHTS.get(self.type, HEIGHT)
+
+
+Described = tuple[ObjectDescription, ...]
+
+
+def driven_and_others(items: Iterable[ObjectDescription]) -> tuple[Described, Described]:
+    """Return the driven vehicles, and all other objects, each in their order."""
+    items = tuple(items)
+    return (tuple(item for item in items if item.role.is_ego),
+            tuple(item for item in items if not item.role.is_ego))
 
 
 def whole_id(object_id: str) -> str:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GAME, GameDocument, OBJECTS
-from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.game.objects import driven_and_others, ObjectDescription
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.scenario.loading import scenario_digest
 
@@ -33,7 +33,7 @@ class Epoch:
 
     :param game: its game.
     :param xml_text: its scenario.
-    :param descriptions: all vehicles and objects that could appear in it.
+    :param descriptions: all vehicles and objects that could appear in it, those driven first.
     :param from_log_ns: messages logged earlier belong to the run before, None if stamps decide.
     :param until_stamp_ns: clock offset of the next run, None without one or if log times decide.
     :param until_log_ns: messages logged from then on belong to the next run, None as above.
@@ -45,6 +45,16 @@ class Epoch:
     from_log_ns: int | None
     until_stamp_ns: int | None
     until_log_ns: int | None
+
+    @property
+    def vehicle_ids(self) -> list[str]:
+        """Return the ids of the driven vehicles."""
+        return [item.id for item in self.game.vehicles]
+
+    @property
+    def object_ids(self) -> list[str]:
+        """Return the ids of all other objects."""
+        return [item.id for item in self.descriptions[len(self.game.vehicles):]]
 
     def holds(self, stamp_ns: int, log_time_ns: int) -> bool:
         """Return whether a message belongs to this run."""
@@ -142,8 +152,8 @@ def _objects_of(game: GameDocument, texts: Sequence[_Text], log_ns: int,
         except InputError:
             reader.foreign[OBJECTS.topic] += 1
             continue
-        if [item.id for item in descriptions if item.role.is_ego] == vehicles:
-            return (*(item for item in descriptions if item.role.is_ego),
-                    *(item for item in descriptions if not item.role.is_ego))
+        driven, others = driven_and_others(descriptions)
+        if [item.id for item in driven] == vehicles:
+            return (*driven, *others)
     raise InputError(f'{OBJECTS.topic} is that of another run', str(reader.path),
                      'record from before the start of the run')

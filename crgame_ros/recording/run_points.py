@@ -140,7 +140,7 @@ def recorded_states(path: Path, epoch: int | None = None) -> dict[str, NDArray[n
     """
     with BagReader(path, parts=True) as reader:
         run = read_epoch(reader, epoch)
-        vehicles = [item.id for item in run.descriptions if item.role.is_ego]
+        vehicles = run.vehicle_ids
         points = read_points(reader, run, {VEHICLES_TOPIC: vehicles})[VEHICLES_TOPIC]
     scheduler = run.game.scheduler
     if not points or min(points) > farthest(scheduler):

@@ -148,8 +148,7 @@ def read_trajectories(path: Path, epoch: int | None = None,
     """
     with BagReader(path, parts=True, progress=progress) as reader:
         run = read_epoch(reader, epoch)
-        vehicles = [item.id for item in run.descriptions if item.role.is_ego]
-        objects = [item.id for item in run.descriptions if not item.role.is_ego]
+        vehicles, objects = run.vehicle_ids, run.object_ids
         points = read_points(reader, run, _wanted(reader, vehicles, objects))
         notices = [*reader.notices, *reader.foreign_notices]
         table = _cycles(reader, run, points, notices)

@@ -82,8 +82,7 @@ def recorded_contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleD
 
 
 def _read_motions(reader: BagReader, run: Epoch) -> Motions:
-    vehicles = [item.id for item in run.descriptions if item.role.is_ego]
-    objects = [item.id for item in run.descriptions if not item.role.is_ego]
+    vehicles, objects = run.vehicle_ids, run.object_ids
     points = read_points(reader, run, {VEHICLES_TOPIC: vehicles, OBJECT_STATES_TOPIC: objects})
     for topic, ids in ((VEHICLES_TOPIC, vehicles), (OBJECT_STATES_TOPIC, objects)):
         if ids and not points[topic]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GAME, GameDocument, OBJECTS
-from crgame_ros.game.objects import ObjectDescription
+from crgame_ros.game.objects import driven_and_others, ObjectDescription
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario, scenario_digest
 
@@ -34,12 +34,12 @@ class ScenarioSet:
     @property
     def driven(self) -> tuple[ObjectDescription, ...]:
         """Return the driven vehicles, in the order of `/vehicles/state`."""
-        return tuple(item for item in self.objects if item.role.is_ego)
+        return driven_and_others(self.objects)[0]
 
     @property
     def others(self) -> tuple[ObjectDescription, ...]:
         """Return all other objects, in the order of `/traffic/objects`."""
-        return tuple(item for item in self.objects if not item.role.is_ego)
+        return driven_and_others(self.objects)[1]
 
 
 class DocumentCollector:
@@ -75,7 +75,7 @@ class DocumentCollector:
         if scenario_digest(self._texts['xml']) != game.scenario_sha256:
             return None
         objects = OBJECTS.read(self._texts['objects'])
-        if [item.id for item in objects if item.role.is_ego] \
+        if [item.id for item in driven_and_others(objects)[0]] \
                 != [item.id for item in game.vehicles]:
             return None
         if self._loaded is None or self._loaded.sha256 != game.scenario_sha256:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
 
 from crgame_ros.schema.marks import Within
+from crgame_ros.timing.measures import TIMING_MEASURES
 
 Bound = Annotated[float, Within(0.0)] | None
 
@@ -60,13 +61,18 @@ class Excess(NamedTuple):
                 f' instead of {check.bound(self.bound)}')
 
 
+def _timed(key: str, unit: str = '', factor: float = 1.0, digits: int = 0,
+           least: bool = False) -> Check:
+    return Check(TIMING_MEASURES[key].label.lower(), unit, factor, digits, least)
+
+
 # Of the simulation, from the recording.
 TIMING = {
-    'max_cumulative_error_s': Check('greatest cumulative error', 'ms', 1e3),
-    'timeout_ratio': Check('cycles that took longer than a step', '%', 100.0, 1),
-    'real_time_ratio_final': Check('real-time ratio', digits=3, least=True),
-    'resets': Check('drift resets'),
-    'gaps': Check('cycles not recorded'),
+    'max_cumulative_error_s': _timed('max_cumulative_error_ms', 'ms', 1e3),
+    'timeout_ratio': _timed('timeout_ratio', '%', 100.0, 1),
+    'real_time_ratio_final': _timed('real_time_ratio_final', digits=3, least=True),
+    'resets': _timed('resets'),
+    'gaps': _timed('gaps'),
     'input_delay_s': Check('input delay', 'ms', 1e3),
     'plans_of_others': Check("plans of other programs than the AVs' planners")}
 # Of the participant's page, known during the drive.

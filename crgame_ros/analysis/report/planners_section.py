@@ -26,26 +26,15 @@ from crgame_ros.analysis.scores.nuplan import WEIGHTS
 from crgame_ros.analysis.scores.vehicle import NUPLAN_PARTS, SCORE_MEASURES, VehicleScores
 from crgame_ros.recording.recorded_plans import PlanOutcome
 from crgame_ros.timing.late_step import CAUSE_WORDS
+from crgame_ros.timing.measures import TIMING_MEASURES, timing_values
 
 _LEFT_OUT = (" CommonRoad's costs, checks and feasibility, and how near the goal was, are left "
              'out of the report at the end of a run: <code>crgame report</code> adds them.')
-# Rows of table I: key of `timing.json`, label, unit, factor, digits.
-_TABLE_I = (
-    ('final_error_ms', 'Final error', 'ms', 1.0, 3),
-    ('mean_step_error_ms', 'Mean step error', 'ms', 1.0, 3),
-    ('max_cumulative_error_ms', 'Greatest cumulative error', 'ms', 1.0, 3),
-    ('timeout_ratio', 'Cycles that took longer than a step', '%', 100.0, 3),
-    ('time_efficiency', 'Time efficiency', '%', 100.0, 3),
-    ('precision_ratio', 'Precision ratio', '%', 100.0, 5),
-    ('step_error_p99_ms', 'Step error, 99th percentile', 'ms', 1.0, 3),
-    ('busy_p50_ms', 'Busy time, median', 'ms', 1.0, 3),
-    ('busy_p99_ms', 'Busy time, 99th percentile', 'ms', 1.0, 3),
-    ('rate_hz', 'Rate', 'Hz', 1.0, 2),
-    ('cycles', 'Cycles', '', 1.0, 0),
-    ('gaps', 'Cycles that were not recorded', '', 1.0, 0),
-    ('resets', 'Drift resets', '', 1.0, 0),
-    ('catch_up_steps', 'Steps that were caught up', '', 1.0, 0))
-_RATIO = ('final', 'mean', 'min')
+# Factor, unit and digits of numbers that are not written to three digits.
+_FORMS = {'timeout_ratio': (100.0, '%', 3), 'time_efficiency': (100.0, '%', 3),
+          'precision_ratio': (100.0, '%', 5), **dict.fromkeys((
+              'real_time_ratio_final', 'real_time_ratio_mean', 'real_time_ratio_min'),
+              (1.0, '', 4))}
 
 
 def planners_section(run: Run) -> Section | None:
@@ -150,10 +139,10 @@ def timing_section(run: Run) -> Section:
 
 
 def _timing_rows(timing: Mapping[str, Any]) -> Iterator[Sequence[str]]:
-    for key, words, unit, factor, digits in _TABLE_I:
-        yield words, number(factor * timing[key], digits), unit
-    for key in _RATIO:
-        yield f'Real-time ratio, {key}', number(timing['real_time_ratio'][key], 4), ''
+    for key, value in timing_values(timing).items():
+        measure = TIMING_MEASURES[key]
+        factor, unit, digits = _FORMS.get(key, (1.0, measure.symbol, 0 if measure.is_count else 3))
+        yield measure_word(measure), number(factor * value, digits), unit
 
 
 def _late_steps(late: Mapping[str, Any] | None) -> str:

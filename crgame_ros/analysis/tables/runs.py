@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of runs: the settings of each run, its timing, and its problems."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from dataclasses import replace
 import hashlib
 import json
-from typing import Any
 
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
@@ -19,29 +19,23 @@ from crgame_ros.analysis.tables.column import (
     TEXT,
 )
 from crgame_ros.game.objects import Role
+from crgame_ros.measures import Measure
+from crgame_ros.timing.measures import TIMING_MEASURES, timing_values
 
 UNTIMED = 'its timing was not recorded, as that of an offline run'
 UNTOLD = 'its cycles were not recorded'
-# From `timing.json`: key, unit there, column, its unit and factor; docs/timing.md defines them.
-_MS = ('s', 1e-3)
-TIMING = {
-    'final_error_ms': ('final_error_s', *_MS, 'final timing error E_f'),
-    'mean_step_error_ms': ('mean_step_error_s', *_MS, 'mean of |e_n|, the error of a step'),
-    'max_cumulative_error_ms': ('max_cumulative_error_s', *_MS, 'greatest cumulative error E_max'),
-    'timeout_ratio': ('timeout_ratio', '1', 1.0, 'share of cycles busier than a step'),
-    'time_efficiency': ('time_efficiency', '1', 1.0, 'time efficiency eta_t, as a fraction'),
-    'precision_ratio': ('precision_ratio', '1', 1.0, 'precision ratio P_r'),
-    'duration_s': ('timed_duration_s', 's', 1.0, 'measured duration, without pauses and scaled by '
-                   'the real-time factor'),
-    'rate_hz': ('rate_hz', 'Hz', 1.0, 'simulation steps per second'),
-    'dropped_ms': ('dropped_s', *_MS, 'time by which drift resets moved the schedule'),
-    'worst_lag_ms': ('worst_lag_s', *_MS, 'greatest lag behind the schedule in force'),
-    'step_error_p99_ms': ('step_error_p99_s', *_MS, '99th percentile of |e_n|'),
-    'busy_p50_ms': ('busy_p50_s', *_MS, 'median busy time of a cycle'),
-    'busy_p99_ms': ('busy_p99_s', *_MS, '99th percentile of the busy time')}
-RATIOS = {'final': 'over the whole run', 'mean': 'mean over all steps', 'min': 'least of a step'}
-COUNTS = {'cycles': 'cycles that were recorded', 'gaps': 'cycles that were lost',
-          'resets': 'drift resets', 'catch_up_steps': 'cycles more than a step late'}
+
+
+def _column(key: str, measure: Measure) -> tuple[Column, float]:
+    """Return the column of a number of `timing.json`, and the factor to its unit."""
+    if measure.unit == 'ms':
+        name = key.removesuffix('_ms') + '_s'
+        return Column.of(name, replace(measure, unit='s'), UNTIMED), 1e-3
+    # The run's duration has another column.
+    return Column.of('timed_duration_s' if key == 'duration_s' else key, measure, UNTIMED), 1.0
+
+
+_COLUMNS = {key: _column(key, measure) for key, measure in TIMING_MEASURES.items()}
 
 
 def _identity(run: Run) -> Iterator[Row]:
@@ -66,11 +60,10 @@ def _identity(run: Run) -> Iterator[Row]:
 
 
 def _timing(run: Run) -> Iterator[Row]:
-    timing: Mapping[str, Any] | None = run.timing
-    found: dict[str, object] = {} if timing is None else {
-        **{name: timing[key] * factor for key, (name, _, factor, _) in TIMING.items()},
-        **{f'real_time_ratio_{key}': timing['real_time_ratio'][key] for key in RATIOS},
-        **{key: timing[key] for key in COUNTS}}
+    found: dict[str, object] = {} if run.timing is None else {
+        column.name: value if column.type == INTEGER else factor * value
+        for value, (column, factor) in zip(
+            timing_values(run.timing).values(), _COLUMNS.values(), strict=True)}
     if run.outcome is not None:
         found['violations'] = run.outcome['drivability']['violations']
         found['contacts'] = None if run.contacts is None else len(run.contacts)
@@ -102,11 +95,7 @@ RUN_PARTS = (
                empty='all data are here'),
     ), _identity),
     TablePart((
-        *(Column(name, NUMBER, unit, what, variant='as docs/timing.md defines it', empty=UNTIMED)
-          for name, unit, _, what in TIMING.values()),
-        *(Column(f'real_time_ratio_{key}', NUMBER, '1', f'simulated over wall time, {what}',
-                 empty=UNTIMED) for key, what in RATIOS.items()),
-        *(Column(key, INTEGER, '1', what, empty=UNTIMED) for key, what in COUNTS.items()),
+        *(column for column, _ in _COLUMNS.values()),
         Column('violations', INTEGER, '1', 'collisions and departures from the road that began',
                variant='of all driven vehicles, each as often as it began', empty=UNTOLD),
         Column('contacts', INTEGER, '1', 'first contacts of driven vehicles with something',

@@ -35,6 +35,7 @@ from crgame_ros.study.data.preregistration import check_measures, method_of
 from crgame_ros.study.data.session_tables import counted_tracks, STAIRCASES
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
 from crgame_ros.study.planned_analysis import HYPOTHESES
+from crgame_ros.study.quality import Check, CHECKS
 from crgame_ros.study.staircase import StaircaseTrial, Track
 from crgame_ros.whole_file import write_text
 
@@ -45,12 +46,9 @@ _TROUBLES = {
     'practice_aborted': 'practice aborted', 'item_skipped': 'left out',
     'item_repeated': 'asked again', 'session_ended': 'session ended early',
     'participant_excluded': 'participant excluded'}
-_TIMES = (('max_cumulative_error_s', 'greatest error [ms]', 1e3, 1),
-          ('timeout_ratio', 'timeouts [%]', 100.0, 2),
-          ('real_time_ratio_final', 'real-time ratio', 1.0, 4),
-          ('resets', 'drift resets', 1.0, 0), ('gaps', 'cycles lost', 1.0, 0),
-          ('input_delay_s', 'input delay [ms]', 1e3, 1),
-          ('link_delay_s', 'link delay [ms]', 1e3, 1))
+_TIMES = {name: CHECKS[name] for name in (
+    'max_cumulative_error_s', 'timeout_ratio', 'real_time_ratio_final', 'resets', 'gaps',
+    'input_delay_s', 'link_delay_s')}
 _PARTS: dict[Part, str] = {
     'excluded': 'excluded', 'declined': 'did not give consent', 'ended': 'session ended early',
     'under way': 'under way', 'completed': 'completed'}
@@ -159,7 +157,9 @@ def _timing(data: StudyData) -> str:
                 'trials stay in the tables, where timing_flag and page_flag tell them. What is '
                 'not known is not judged.')
     return html + table('Timing of the trials that count', (
-        '', 'trial', 'condition', *(words for _, words, _, _ in _TIMES), 'beyond'),
+        '', 'trial', 'condition', *(
+            f'{check.words} [{check.unit}]' if check.unit else check.words
+            for check in _TIMES.values()), 'beyond'),
         list(_timed(data.trials)), 'numbers trials')
 
 
@@ -169,12 +169,12 @@ def _timed(trials: Sequence[CountedTrial]) -> Iterator[Sequence[str]]:
         reason = '; '.join(filter(None, (row['timing_reason'], row['page_reason'])))
         beyond = marked(free(reason), True) if reason else free(row['problem'] or '')
         yield (free(row['participant']), str(row['trial']), free(row['condition']),
-               *(_measured(row.get(name), factor, digits) for name, _, factor, digits in _TIMES),
+               *(_measured(row.get(name), check) for name, check in _TIMES.items()),
                beyond)
 
 
-def _measured(value: float | None, factor: float, digits: int) -> str:
-    return NOTHING if value is None else number(factor * value, digits)
+def _measured(value: float | None, check: Check) -> str:
+    return NOTHING if value is None else number(check.factor * value, check.digits)
 
 
 def _rows(data: StudyData, name: str) -> list[dict[str, Any]]:
