@@ -28,6 +28,29 @@ def test_what_is_called_is_loaded_then(tmp_path: Path, monkeypatch: pytest.Monke
         user.drawing.paint()
 
 
+def test_a_part_of_a_package_is_loaded_alone(tmp_path: Path) -> None:
+    """The package is loaded afterwards as if nothing had been; nothing else of it is before."""
+    (tmp_path / 'user_of_tools.py').write_text('from tools import cut, glue, paint\n')
+    package = tmp_path / 'tools'
+    package.mkdir()
+    (package / '__init__.py').write_text('from tools.saws import cut\nfrom tools.pots import *\n')
+    (package / 'saws.py').write_text('from . import _steel\ndef cut(): return _steel.NAME\n')
+    (package / '_steel.py').write_text('NAME = "steel"\n')
+    (package / 'pots.py').write_text('def glue(): return "glue"\ndef paint(): return "paint"\n')
+    code = """
+import sys
+from crgame_ros.postponed import postponed
+with postponed('tools', parts={'cut': 'saws'}):
+    import user_of_tools as user
+print(user.cut(), *sorted(name for name in sys.modules if name.startswith('tools')))
+print(user.glue(), user.cut(), sys.modules['tools'].paint(), sys.modules['tools'].cut())
+"""
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                          cwd=tmp_path, check=True)
+    assert done.stdout.splitlines() == [
+        'steel tools._steel tools.saws', 'glue steel paint steel']
+
+
 def test_what_is_there_already_stays() -> None:
     with postponed('pathlib'):
         assert sys.modules['pathlib'].Path is Path

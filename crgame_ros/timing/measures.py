@@ -29,7 +29,7 @@ TIMING_MEASURES = {
     'rate_hz': _of('Hz', 'Rate', 'simulation steps per second', 0),
     'dropped_ms': _of('ms', 'Dropped by drift resets',
                       'time by which drift resets moved the schedule'),
-    'worst_lag_ms': _of('ms', 'Largest lag', 'greatest lag behind the schedule in force'),
+    'worst_lag_ms': _of('ms', 'Worst lag', 'greatest lag behind the schedule in force'),
     'step_error_p99_ms': _of('ms', 'Step error, 99th percentile', '99th percentile of |e_n|'),
     'busy_p50_ms': _of('ms', 'Busy time, median', 'median busy time of a cycle'),
     'busy_p99_ms': _of('ms', 'Busy time, 99th percentile', '99th percentile of the busy time'),
