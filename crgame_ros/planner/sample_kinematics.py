@@ -17,7 +17,7 @@ from crgame_ros.postponed import postponed, UNUSED
 import numpy as np
 from numpy.typing import NDArray
 
-with postponed(*UNUSED):
+with postponed(*UNUSED, 'scipy.spatial.kdtree'):
     from commonroad_clcs.pycrccosy import (
         CurvilinearProjectionDomainLateralError,
         CurvilinearProjectionDomainLongitudinalError,

@@ -23,9 +23,8 @@ for kind in VehicleType:
     setattr(import_module(f'vehiclemodels.{name}'), name, partial(vehicle_parameters.get, kind))
 
 # Of scipy, costs and feasibility call three functions; what is imported with them takes 0.4 s.
-with postponed(*UNUSED, 'scipy.integrate', 'scipy.interpolate', 'scipy.optimize', 'scipy.signal',
-               'scipy.special', parts={'odeint': '_odepack_py', 'simpson': '_quadrature',
-                                       'minimize': '_minimize'}):
+with postponed(*UNUSED, 'scipy.special', parts={
+        'odeint': '_odepack_py', 'simpson': '_quadrature', 'minimize': '_minimize'}):
     from commonroad_clcs.helper.interpolation import Interpolator
     from commonroad_dc.costs import route_matcher
     from commonroad_dc.costs.evaluation import (
