@@ -9,8 +9,8 @@ from importlib.util import find_spec
 import sys
 from types import MappingProxyType, ModuleType
 
-# What CommonRoad's packages draw with, and packages of scipy of which they call a function or none;
-# scipy imports all of numpy, also what compiles Fortran.
+# What CommonRoad's packages draw with, and packages of scipy of which they call a function or
+# none. scipy imports all of numpy, also what compiles Fortran.
 UNUSED = ('matplotlib', 'matplotlib.colors', 'matplotlib.pyplot',
           'commonroad.visualization.mp_renderer', 'numpy.f2py', 'scipy.integrate',
           'scipy.interpolate', 'scipy.optimize', 'scipy.signal')
