@@ -20,6 +20,9 @@ import type { Store } from '../store.js';
 const LARGEST_FILE = 64 * 1024 * 1024;
 // Longest wait for the loaded run to begin [ms].
 const BEGINS_WITHIN_MS = 60000;
+// What is said of a preview that takes longer: code for traffic is compiled when first needed.
+const SLOW_MS = 6000;
+const COMPILING = 'Reading the scenario … Traffic needs a minute when it is first used.';
 
 /** The panel's parts and choices. */
 class ScenarioPanel {
@@ -107,6 +110,8 @@ class ScenarioPanel {
     this.#list.mark(id);
     this.#start.disabled = true;
     this.#busy.describe('Reading the scenario …');
+    const slow = setTimeout(() => this.#busy.describe(COMPILING), SLOW_MS);
+    abort.signal.addEventListener('abort', () => clearTimeout(slow));
     try {
       const preview = await fetchPreview(id, abort.signal);
       this.#show(preview);
@@ -117,6 +122,7 @@ class ScenarioPanel {
       this.#card.hidden = true;
       setText(this.#errors.preview, errorText(error));
     }
+    clearTimeout(slow);
     this.#busy.end();
   }
 
