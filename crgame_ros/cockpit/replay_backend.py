@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 import json
 from pathlib import Path
+from threading import Event
 from typing import Literal, TYPE_CHECKING, TypeVar
 
 from aiohttp import web
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from crgame_ros.cockpit.hub import Hub
 
 T = TypeVar('T')
+Progress = Callable[[float], None]
 
 
 def recorded_criticality(reader: BagReader, run: Epoch) -> bytes | None:
@@ -51,12 +53,13 @@ def recorded_criticality(reader: BagReader, run: Epoch) -> bytes | None:
     return pack(found) if found else None
 
 
-def measured_criticality(run: Epoch, path: Path) -> bytes:
+def measured_criticality(run: Epoch, path: Path, go_on: Progress) -> bytes:
     """
     Measure a run and return its frames, each after its length in bytes.
 
     A run of minutes takes seconds.
 
+    :param go_on: called over and over with the share that is done; what it raises ends the work.
     :raises InputError: if the run cannot be measured.
     """
     frames = MessageFrames(run.game, run.descriptions)
@@ -67,11 +70,9 @@ def measured_criticality(run: Epoch, path: Path) -> bytes:
         if (frame := frames.criticality_of(rows)) is not None:
             found.append(frame.data)
 
-    measure_log(read_trajectories(path, run.game.epoch), on_tick=add_step)
+    measure_log(read_trajectories(path, run.game.epoch, go_on), progress=go_on, on_tick=add_step)
     return pack(found)
 
-
-Progress = Callable[[float], None]
 
 # Each holds 5 s: enough for two people who view different parts.
 CHUNKS_KEPT = 8
@@ -146,6 +147,7 @@ class ReplayBackend:
         self.path = recording_in(path)
         # SQLite and the chunks in memory are used in one thread only.
         self._thread = ThreadPoolExecutor(1, 'replay')
+        self._closed = Event()
         self._measuring = asyncio.Lock()
         self._measured: dict[int, bytes] = {}
         try:
@@ -163,9 +165,19 @@ class ReplayBackend:
         return self._reader.notices
 
     def close(self) -> None:
-        """Close the recording after the current read."""
+        """Close the recording after the current read; a measurement ends at once."""
+        self._closed.set()
         self._thread.submit(self._reader.close)
         self._thread.shutdown()
+
+    def go_on(self, _: float) -> None:
+        """
+        Let a measurement go on.
+
+        :raises CrgameError: once the recording is closed.
+        """
+        if self._closed.is_set():
+            raise CrgameError('the replay has ended')
 
     def _open(self) -> tuple[BagReader, tuple[int, ...]]:
         reader = BagReader(self.path, parts=True)
@@ -243,7 +255,8 @@ class ReplayBackend:
                 run, data = await self._read(self._criticality, epoch)
                 if data is None:
                     # Not in the reading thread, or nothing would be shown meanwhile.
-                    data = await self._read(measured_criticality, run, self.path, thread=None)
+                    data = await self._read(measured_criticality, run, self.path, self.go_on,
+                                            thread=None)
                 self._measured[epoch] = data
         return web.Response(body=self._measured[epoch], content_type='application/octet-stream')
 

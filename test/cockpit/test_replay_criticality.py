@@ -18,7 +18,10 @@ from crgame_ros.analysis.criticality.rows import (
     PET,
     PLACE_COLUMNS,
 )
-from crgame_ros.cockpit.replay_backend import ReplayBackend
+from crgame_ros.cockpit.replay_backend import measured_criticality, ReplayBackend
+from crgame_ros.errors import CrgameError
+from crgame_ros.recording.epochs import read_epoch
+from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_trajectories import trajectories_of
 from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
@@ -119,6 +122,27 @@ def test_recorded_rows_are_shown_as_they_were_told(rows: dict[int, FloatArray],
     assert found.keys() == {n for n, block in rows.items() if len(block)}
     place = 1 + 2 * list(MEASURES).index('min_distance')
     assert all((block[:, place] > 999.0).all() for block in found.values())
+
+
+def test_a_measurement_ends_with_the_replay(parked: OfflineResult, tmp_path: Path) -> None:
+    """At any moment: while the recording is read, or after a step."""
+    bag = record(tmp_path / 'bag', recorder.messages(parked))
+    with BagReader(bag, parts=True) as reader:
+        run = read_epoch(reader, 0)
+    for most in (1, 30):
+        shares: list[float] = []
+
+        def go_on(share: float, shares: list[float] = shares, most: int = most) -> None:
+            shares.append(share)
+            if len(shares) == most:
+                raise CrgameError('ended')
+        with pytest.raises(CrgameError, match='ended'):
+            measured_criticality(run, bag, go_on)
+        assert len(shares) == most and shares[-1] < 1.0
+    backend = ReplayBackend(bag, 0)
+    backend.close()
+    with pytest.raises(CrgameError, match='the replay has ended'):
+        measured_criticality(run, bag, backend.go_on)
 
 
 def test_a_run_that_is_not_there_is_said(parked: OfflineResult, tmp_path: Path) -> None:
