@@ -35,6 +35,9 @@ def test_a_recording_has_the_same_record(recorder: Any, tmp_path: Path) -> None:
         assert np.array_equal(record.commands[:, 1, 4], result.commands[1:, 1, 4])
         assert record.fired == result.fired
         assert np.array_equal(record.log.ks, here.log.ks)
+        # No step led to the first state.
+        assert np.isnan(record.log.commands[0]).all()
+        assert np.array_equal(record.log.commands[1:], result.commands[10::10], equal_nan=True)
 
 
 def test_a_vehicle_put_back_before_the_log_begins_does_not_jump_in_it() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.results.cell_rows import FACTORS
 from crgame_ros.evaluation.summary.cell_block import CellBlocks, EvaluatedParts
-from crgame_ros.evaluation.summary.measures import MEASURES
+from crgame_ros.evaluation.summary.measures import better_of, MEASURES
 from crgame_ros.evaluation.summary.summarise import summarise
 from crgame_ros.evaluation.summary.summary import Estimate, Summary
 from crgame_ros.evaluation.summary.tables import summary_tables
@@ -335,6 +335,15 @@ def test_what_comes_of_almost_equal_speeds_does_not_make_the_mean() -> None:
     values = ttc.values(np.array([2.0, 9.0, 3e14, math.nan, math.inf]))
     assert np.array_equal(values, [2.0, 9.0, 20.0, math.nan, math.nan], equal_nan=True)
     assert ttc.definition.endswith('greater ones count as 20')
+
+
+@pytest.mark.parametrize(('name', 'better'), [
+    ('worst_ttc', 1), ('worst_drac', -1), ('worst_a_req', 1), ('tet_s', -1),
+    ('red_lights_run', -1), ('score_comfort', 1), ('score_jb1', -1), ('score_valid', 1),
+    ('score_last_distance', -1), ('distance', 0), ('drive_speed_mean', 0)])
+def test_it_is_known_which_values_are_better(name: str, better: int) -> None:
+    """Also of columns that only `--measure` asks for."""
+    assert better_of(name) == better
 
 
 def test_a_negligible_difference_is_not_told(tmp_path: Path) -> None:
