@@ -79,8 +79,9 @@ def replay(values: argparse.Namespace) -> int:
     outcomes: list[Callable[[], int]] = []
     for alternative in runs:
         scores = scores_of(alternative.record, {}, drives_only=True).vehicles
-        outcomes.append(partial(tell_outcome, _say, alternative.outcome, alternative.criticality,
-                                f'{alternative.planner}: ', scores))
+        assert alternative.outcome is not None
+        outcomes.append(partial(tell_outcome, _say, alternative.outcome,
+                                alternative.usual_criticality, f'{alternative.planner}: ', scores))
         found.append(alternative.as_dict())
         # Written after each, so that a failure loses none of the others.
         write_text(json.dumps(found, indent=2, allow_nan=False) + '\n',
@@ -131,7 +132,7 @@ def _offline(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories')
 
 def _live(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories') -> _Runs:
     """Replay against each planner in real time, one graph after the other."""
-    from crgame_ros.analysis.counterfactual import driven_live
+    from crgame_ros.analysis.counterfactual import Alternative
     from crgame_ros.analysis.outcome_line import NO_PLANS
     from crgame_ros.launcher.interruption import run_to_its_end
     folder = _make_folder(values.out, values.run)
@@ -147,7 +148,7 @@ def _live(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories') ->
             if code not in (0, NO_PLANS):
                 raise CrgameError(f'the run against {name} ended with {code}; '
                                   f'what it said is above, its files are in {run}')
-            yield driven_live(name, run, recorded)
+            yield Alternative.of_live(name, run, recorded)
 
     return folder, runs()
 

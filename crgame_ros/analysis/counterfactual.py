@@ -2,24 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Repeats a recorded human against another planner, and compares the result to the recording."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Mapping
+from functools import cached_property, partial
 from pathlib import Path
 import time
 
-from crgame_ros.analysis.criticality.criticality import Criticality
-from crgame_ros.analysis.criticality.recorded import measure_log
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.driver.source import IdleDriver
 from crgame_ros.errors import InputError
 from crgame_ros.recording.progress import Progress
 from crgame_ros.recording.recorded_game import recorded_inputs, RecordedInputs
-from crgame_ros.recording.recorded_plans import plans_of_report, RunReport
+from crgame_ros.recording.recorded_plans import RunReport
 from crgame_ros.recording.run_folder import recording_in
-from crgame_ros.recording.run_record import read_run_record, run_record_of, RunRecord
+from crgame_ros.recording.run_record import read_run_record, RunRecord
 from crgame_ros.recording.run_trajectories import RunTrajectories
-from crgame_ros.recording.timing_report import offline_outcome, timing_report
-from crgame_ros.simulation.contacts import ContactEntry
+from crgame_ros.recording.timing_report import timing_report
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import Setup
 import numpy as np
@@ -29,40 +26,53 @@ FloatArray = NDArray[np.float64]
 SAME = 1e-9
 
 
-@dataclass(frozen=True)
-class Alternative:
+class Alternative(Run):
     """
     A run of a recorded human against a planner.
 
-    :param planner: its name, as given by the user.
-    :param record: the run: its motion on the scenario's grid, commands and events.
-    :param outcome: of the run: content of `timing.json`, or result of `offline_outcome`.
-    :param criticality: measured in this run.
-    :param human_differs_s: first time at which a human's pose differs from the recording; None:
-        never [s]
-    :param others_differ_s: first time at which the pose of an object that is not driven differs:
-        objects that react to the AV change the scene, and the human's inputs may no longer fit
-        it; None: never [s]
-    :param result: result of an offline run; None for a live one.
+    :ivar planner: its name, as given by the user.
+    :ivar result: result of an offline run; None for a live one.
     """
 
-    planner: str
-    record: RunRecord
-    outcome: RunReport
-    criticality: Criticality
-    human_differs_s: float | None
-    others_differ_s: float | None
-    result: OfflineResult | None = None
+    def __init__(self, planner: str, recorded: RunTrajectories, *, bag: Path | None = None,
+                 record: RunRecord | None = None, timing: RunReport | None = None,
+                 result: OfflineResult | None = None) -> None:
+        """
+        Keep what is known, as `Run` does.
 
-    @property
-    def log(self) -> RunTrajectories:
-        """Return the motion of all vehicles and objects, at the scenario's time steps."""
-        return self.record.log
+        :param recorded: the run that was recorded.
+        """
+        super().__init__(planner, bag=bag, record=record, timing=timing, result=result)
+        self.planner, self.result, self._recorded = planner, result, recorded
 
-    @property
-    def contacts(self) -> Sequence[ContactEntry] | None:
-        """Return the first contact of each pair as in `timing.json`; None if unknown."""
-        return self.outcome['contacts']
+    @classmethod
+    def of_live(cls, planner: str, folder: Path, recorded: RunTrajectories) -> 'Alternative':
+        """
+        Read a live run.
+
+        :param folder: of that run.
+        :raises InputError: if its recording cannot be used.
+        """
+        bag = recording_in(folder)
+        record = read_run_record(bag)
+        return cls(planner, recorded, bag=bag, record=record,
+                   timing=timing_report(bag, log=record.log))
+
+    @cached_property
+    def human_differs_s(self) -> float | None:
+        """Return when a human's pose first differs from the recording [s]; None: never."""
+        humans = len(self._recorded.game.humans)
+        return self._differs_s(*(log.published_states[:, :humans, :3]
+                                 for log in (self.log, self._recorded)))
+
+    @cached_property
+    def others_differ_s(self) -> float | None:
+        """
+        Return when the pose of an object that is not driven first differs [s]; None: never.
+
+        Objects that react to the AV change the scene, and the human's inputs may no longer fit it.
+        """
+        return self._differs_s(self.log.object_poses, self._recorded.object_poses)
 
     @property
     def state_hash(self) -> str | None:
@@ -74,10 +84,17 @@ class Alternative:
         return {
             'planner': self.planner, 'state_hash': self.state_hash,
             'human_differs_s': self.human_differs_s, 'others_differ_s': self.others_differ_s,
-            'accepted_ratio': {av: found.accepted_share
-                               for av, found in plans_of_report(self.outcome).items()},
+            'accepted_ratio': {av: found.accepted_share for av, found in self.answers.items()},
             'contacts': self.contacts,
-            'criticality': self.criticality.as_dict()}
+            'criticality': self.usual_criticality.as_dict()}
+
+    def _differs_s(self, found: FloatArray, expected: FloatArray) -> float | None:
+        """Return the time at which poses (K, N, 3) of both runs begin to differ, None if never."""
+        _, here, there = np.intersect1d(self.log.ks, self._recorded.ks, return_indices=True)
+        apart = np.abs(found[here] - expected[there]) > SAME
+        absent = np.isnan(found[here]) != np.isnan(expected[there])
+        rows = np.flatnonzero((apart | absent).any(axis=(1, 2)))
+        return float(self._recorded.times_s[there[rows[0]]]) if len(rows) else None
 
 
 def drive_against(planner: str, setup: Setup, recorded: RunTrajectories, latency_steps: int = 0,
@@ -103,18 +120,7 @@ def drive_against(planner: str, setup: Setup, recorded: RunTrajectories, latency
                     say=say, progress=Progress(say, f'driving against {planner}'))
     result = _drive_inputs(drive, setup, inputs) if traces is None \
         else _drive_trajectory(drive, setup, traces)
-    return _compare(planner, run_record_of(result), offline_outcome(result), recorded, result)
-
-
-def driven_live(planner: str, folder: Path, recorded: RunTrajectories) -> Alternative:
-    """
-    Compare a live run of a recorded human against a planner, from the run's folder.
-
-    :raises InputError: if its recording cannot be used.
-    """
-    bag = recording_in(folder)
-    record = read_run_record(bag)
-    return _compare(planner, record, timing_report(bag, log=record.log), recorded)
+    return Alternative(planner, recorded, result=result)
 
 
 def _drive_inputs(drive: Callable[..., OfflineResult], setup: Setup,
@@ -132,23 +138,3 @@ def _drive_trajectory(drive: Callable[..., OfflineResult], setup: Setup,
     steps = min(map(len, humans.values())) - 1
     return drive(duration_s=steps * setup.scheduler.dt_s, traces=humans,
                  drivers={human: IdleDriver() for human in humans})
-
-
-def _compare(planner: str, record: RunRecord, outcome: RunReport,
-             recorded: RunTrajectories, result: OfflineResult | None = None) -> Alternative:
-    log, humans = record.log, len(recorded.game.humans)
-    return Alternative(
-        planner, record, outcome, measure_log(log),
-        _differs_s(log, recorded, log.published_states[:, :humans, :3],
-                   recorded.published_states[:, :humans, :3]),
-        _differs_s(log, recorded, log.object_poses, recorded.object_poses), result)
-
-
-def _differs_s(log: RunTrajectories, recorded: RunTrajectories, found: NDArray[np.float64],
-               expected: NDArray[np.float64]) -> float | None:
-    """Return the time at which poses (K, N, 3) of two runs begin to differ, None if never."""
-    _, here, there = np.intersect1d(log.ks, recorded.ks, return_indices=True)
-    apart = np.abs(found[here] - expected[there]) > SAME
-    absent = np.isnan(found[here]) != np.isnan(expected[there])
-    rows = np.flatnonzero((apart | absent).any(axis=(1, 2)))
-    return float(recorded.times_s[there[rows[0]]]) if len(rows) else None

@@ -11,7 +11,6 @@ import platform
 from typing import Any
 
 from crgame_ros.analysis.counterfactual import Alternative
-from crgame_ros.analysis.pictures.critical_moments import critical_moments
 from crgame_ros.analysis.pictures.figure_style import figure_bytes
 from crgame_ros.analysis.pictures.frames_figure import frames_figure
 from crgame_ros.analysis.pictures.profiles_figure import profiles_figure
@@ -21,7 +20,6 @@ from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS
 from crgame_ros.finite_json import finite
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.export import write_scenario
-from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.reproduction.expectation import Judgement
 from crgame_ros.reproduction.recorded_human import (
     read_recorded,
@@ -42,11 +40,9 @@ from crgame_ros.reproduction.synchronization import (
     PAPER_TABLE,
     Synchronization,
 )
-from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from crgame_ros.version import __version__
 from crgame_ros.whole_file import write_bytes, write_text
 from matplotlib.figure import Figure
-import numpy as np
 
 # Number of panels, as in the paper. There they are 0.2 s apart; ours cover the whole encounter.
 PANELS = 12
@@ -220,13 +216,10 @@ def _pictured(request: EvaluationRequest, run: Alternative, numbers: tuple[int, 
     log, folder, formats = run.log, request.folder, request.formats
     request.runs.mkdir(exist_ok=True)
     write_scenario(log, request.runs / f'{name}.xml')
-    record = RunRecord(log, np.empty(0, dtype=np.int64),
-                       np.empty((0, len(log.vehicles), len(COMMAND_COLUMNS))), ())
-    moments = critical_moments(record, run.criticality, run.contacts or ())
     frames, profiles = numbers
     return (*_write(frames_figure(FrameScene(log), _panel_steps(run)),
                     folder / f'figure_{frames:02}_{name}_frames', formats),
-            *_write(profiles_figure(record, moments[:1]),
+            *_write(profiles_figure(run.record, run.moments[:1]),
                     folder / f'figure_{profiles:02}_{name}_profiles', formats))
 
 

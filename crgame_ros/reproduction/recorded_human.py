@@ -8,7 +8,7 @@ from pathlib import Path
 import sys
 import time
 
-from crgame_ros.analysis.counterfactual import Alternative, drive_against, driven_live
+from crgame_ros.analysis.counterfactual import Alternative, drive_against
 from crgame_ros.errors import CrgameError
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.interruption import run_to_its_end
@@ -85,7 +85,7 @@ def read_recorded(name: str, planner: str, folder: Path) -> RecordedHuman:
         return effective_setup(RunRequest(driver=f'replay:{bag}', planners=(other,)))
 
     log = read_trajectories(bag)
-    return RecordedHuman(name, log, setup_for, None, driven_live(planner, folder, log))
+    return RecordedHuman(name, log, setup_for, None, Alternative.of_live(planner, folder, log))
 
 
 def run_live(game: Path, planner: str, folder: Path, duration_s: float | None = None) -> None:

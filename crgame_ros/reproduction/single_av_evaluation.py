@@ -146,7 +146,7 @@ class Encounter:
             'contacts': self.contacts}
 
     def _worst(self, measure: str) -> float | None:
-        report = self.alternative.criticality.report()
+        report = self.alternative.usual_criticality.report()
         worst = next(item for item in report if item.vehicle_id == self.av).worst.get(measure)
         return worst.value if worst is not None and worst.other == self.human else None
 

@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 
+from crgame_ros.analysis.counterfactual import Alternative
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.reproduction.recorded_human import record_offline
@@ -58,7 +59,8 @@ def test_jump_and_gap_are_found(idm: MultiAvRun, moved: float) -> None:
     states = idm.run.log.vehicle_states.copy()
     states[40, 2, :2] += moved
     log: RunTrajectories = replace(idm.run.log, vehicle_states=states)
-    run = replace(idm, run=replace(idm.run, record=replace(idm.run.record, log=log)))
+    record = replace(idm.run.record, log=log)
+    run = replace(idm, run=Alternative('idm', log, record=record, timing=idm.run.outcome))
     assert 'one time line without a jump' in _unmet(run)
 
 
@@ -74,8 +76,10 @@ def test_step_and_speed(idm: MultiAvRun) -> None:
 
 def test_contact_is_found(idm: MultiAvRun) -> None:
     """Contacts are told with both names."""
-    outcome = {**idm.run.outcome, 'contacts': [{'vehicle': 'av1', 'with': 'av0'}]}
-    touched = replace(idm, run=replace(idm.run, outcome=outcome))
+    assert idm.run.outcome is not None
+    touched = replace(idm, run=Alternative(
+        'idm', idm.run.log, record=idm.run.record,
+        timing={**idm.run.outcome, 'contacts': [{'vehicle': 'av1', 'with': 'av0'}]}))
     judged = judge_multi_av([('x', touched)])
     assert [each.line for each in judged if not each.is_met] == [
         'UNMET: two AVs, x: no contact: av1 with av0']

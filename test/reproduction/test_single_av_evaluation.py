@@ -88,5 +88,5 @@ def test_human_to_the_last_bit(cut_in: RecordedHuman, idm: Alternative, unmoved:
     states = unmoved.log.published_states.copy()
     states[50, 0, 0] = np.nextafter(states[50, 0, 0], np.inf)
     moved = replace(unmoved.log, published_states=states)
-    assert not met(replace(unmoved, record=replace(unmoved.record, log=moved)), cut_in)
+    assert not met(Alternative('', cut_in.log, record=replace(unmoved.record, log=moved)), cut_in)
     assert not met(unmoved, replace(cut_in, log=moved))
