@@ -10,7 +10,6 @@ from typing import Any
 from commonroad.geometry.shape import Shape as CommonRoadShape
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking
-from commonroad.scenario.traffic_light import TrafficLight
 from commonroad.scenario.traffic_sign import TrafficSign
 from crgame_ros.finite_json import finite
 from crgame_ros.game.documents import document_entry, DrivenVehicle, GameDocument
@@ -20,7 +19,7 @@ from crgame_ros.game.task_spec import answer_key, TaskSpec
 from crgame_ros.geometry.curve import arc_length
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import first_of_junctions, RoadNetwork
-from crgame_ros.roads.signs import stop_line_ends
+from crgame_ros.roads.signs import light_places, stop_line_ends
 from crgame_ros.roads.surface import lanelet_areas
 from crgame_ros.scenario.exact_values import group_outline
 from crgame_ros.scenario.light_and_air import environment_of
@@ -75,29 +74,12 @@ def simplified(vertices: Points) -> Points:
 
 def light_entries(network: LaneletNetwork) -> list[Document]:
     """Describe the lights that have a place: their position, lanelets and movement."""
-    lanelets: dict[int, list[Lanelet]] = {}
-    for lanelet in network.lanelets:
-        for light_id in lanelet.traffic_lights or ():
-            lanelets.setdefault(light_id, []).append(lanelet)
-    return [entry for light in network.traffic_lights
-            if (entry := _light(light, lanelets.get(light.traffic_light_id, []))) is not None]
-
-
-def _light(light: TrafficLight, lanelets: list[Lanelet]) -> Document | None:
-    """Describe a light; None if it has neither a position nor a lanelet."""
-    position, yaw = light.position, 0.0
-    if lanelets:
-        along = lanelets[0].center_vertices[-1, :2] - lanelets[0].center_vertices[-2, :2]
-        yaw = math.atan2(along[1], along[0])
-        if position is None:
-            position = lanelets[0].center_vertices[-1]
-    if position is None:
-        return None
-    direction = light.direction
-    return {'id': int(light.traffic_light_id), 'x': rounded(position[0]),
-            'y': rounded(position[1]), 'yaw': yaw,
-            'direction': 'all' if direction is None else str(direction.value),
-            'lanelets': [int(lanelet.lanelet_id) for lanelet in lanelets]}
+    places = light_places(network)
+    return [{'id': number, 'x': rounded(places[number].x), 'y': rounded(places[number].y),
+             'yaw': places[number].yaw, 'lanelets': list(places[number].lanelets),
+             'direction': 'all' if light.direction is None else str(light.direction.value)}
+            for light in network.traffic_lights
+            if (number := int(light.traffic_light_id)) in places]
 
 
 def sign_entries(network: LaneletNetwork) -> list[Document]:

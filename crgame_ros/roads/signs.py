@@ -3,9 +3,11 @@
 """The signs and lights of a lanelet: its own, those of its stop line, and what lights show."""
 
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from itertools import accumulate
 import math
+from typing import NamedTuple
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from commonroad.scenario.scenario import Scenario
@@ -95,6 +97,39 @@ def lights_of(lanelet: Lanelet, roads: LaneletNetwork) -> list[TrafficLight]:
         ids |= lanelet.stop_line.traffic_light_ref or set()
     found = (roads.find_traffic_light_by_id(light_id) for light_id in sorted(ids))
     return [light for light in found if light is not None]
+
+
+class LightPlace(NamedTuple):
+    """
+    Where a traffic light is.
+
+    :param yaw: heading of the traffic that it is for [rad]
+    :param lanelets: their ids.
+    """
+
+    x: float
+    y: float
+    yaw: float
+    lanelets: tuple[int, ...]
+
+
+def light_places(network: LaneletNetwork) -> dict[int, LightPlace]:
+    """Return by id where lights are: as they say, or at the end of their lane, in its middle."""
+    lanelets = defaultdict[int, list[Lanelet]](list)
+    for lanelet in network.lanelets:
+        for light_id in lanelet.traffic_lights or ():
+            lanelets[light_id].append(lanelet)
+    found = {}
+    for light in network.traffic_lights:
+        own = lanelets[light.traffic_light_id]
+        before, end = own[0].center_vertices[-2:, :2] if own else np.zeros((2, 2))
+        position = end if light.position is None else light.position
+        if own or light.position is not None:
+            found[int(light.traffic_light_id)] = LightPlace(
+                float(position[0]), float(position[1]),
+                math.atan2(end[1] - before[1], end[0] - before[0]),
+                tuple(int(each.lanelet_id) for each in own))
+    return found
 
 
 def has_arrow(light: TrafficLight) -> bool:

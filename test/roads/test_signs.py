@@ -11,6 +11,7 @@ from commonroad.scenario.traffic_sign import (
 )
 from crgame_ros.roads.signs import (
     has_stop_sign,
+    light_places,
     lights_for,
     lights_of,
     sign_elements,
@@ -53,6 +54,17 @@ def test_signs_and_lights_of_the_stop_line_count() -> None:
     assert [element.additional_values for element in own] == [['10']]
     assert [light.traffic_light_id for light in lights_of(lanelet, network)] == [1, 2, 3, 4]
     assert has_stop_sign(lanelet, network)
+
+
+def test_lights_stand_where_they_say_or_at_the_end_of_their_lane() -> None:
+    """One with neither has no place; they look at the traffic of their lanelets."""
+    lanelet, network = road(PLACED)
+    for number in (50, 51):
+        network.add_traffic_light(TrafficLight(number, None), set())
+    network.lanelets[0].traffic_lights = {2, 50}
+    assert light_places(network) == {
+        1: (18.0, 4.0, 0.0, ()), 2: (18.0, 4.0, 0.0, (10,)), 3: (18.0, 4.0, 0.0, ()),
+        4: (18.0, 4.0, 0.0, ()), 50: (20.0, 2.0, 0.0, (10,))}
 
 
 def test_without_a_stop_line_the_last_lanelet_with_the_stop_sign_counts() -> None:

@@ -140,17 +140,13 @@ class Line(Item):
 
 
 class LightMarker(Item):
-    """
-    A traffic light: a ball in the colour of its state.
+    """A traffic light: a ball in the colour of its state, at a place in map [m]."""
 
-    :param place: (x, y) in map [m]
-    """
-
-    def __init__(self, header: Header, light_id: int, place: FloatArray) -> None:
+    def __init__(self, header: Header, light_id: int, x: float, y: float) -> None:
         marker = blank(header, 'lights', light_id, Marker.SPHERE,
                        colour(LIGHT_COLOURS['inactive']),
                        (LIGHT_DIAMETER,) * 3, LIFETIME_S)
-        marker.pose.position.x, marker.pose.position.y = place.tolist()
+        marker.pose.position.x, marker.pose.position.y = x, y
         marker.pose.position.z = LIGHT_Z
         super().__init__((marker,))
         self.present = True

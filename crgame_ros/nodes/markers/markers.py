@@ -18,7 +18,8 @@ from crgame_ros.nodes.markers.bodies import (
     LightMarker,
     Line,
 )
-from crgame_ros.nodes.markers.roads import light_positions, map_markers
+from crgame_ros.nodes.markers.roads import map_markers
+from crgame_ros.roads.signs import light_places
 from crgame_ros.ros.messages import set_time
 from crgame_ros.ros.scenario_documents import ScenarioSet
 from crgame_ros.vehicle.lights import BRAKING, Light
@@ -59,8 +60,9 @@ class SceneMarkers:
         self._bodies = [Body(self._header, number, item)
                         for number, item in enumerate(documents.objects)]
         self._vehicles = len(documents.driven)
-        self._lights = {number: LightMarker(self._header, number, place) for number, place
-                        in light_positions(self._loaded.scenario.lanelet_network).items()}
+        self._lights = {number: LightMarker(self._header, number, place.x, place.y)
+                        for number, place in light_places(
+                            self._loaded.scenario.lanelet_network).items()}
         outlines = {
             item.id: outline(item.shape, CIRCLE_CORNERS, False) + (item.rear_to_center, 0.0)
             for item in documents.objects}

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from commonroad.geometry.shape import ShapeGroup
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
-from commonroad.scenario.traffic_light import TrafficLight
 from crgame_ros.geometry.curve import Curve
 from crgame_ros.nodes.markers import bodies
 from crgame_ros.roads.network import RoadNetwork
@@ -69,20 +68,6 @@ def map_markers(loaded: LoadedScenario, problem_ids: Sequence[int] = ()) -> list
                 if problem.planning_problem_id in problem_ids]
     markers = [*_roads(network), *_lane_lines(network), *_stop_lines(network), *_goals(problems)]
     return [marker for marker in markers if marker.points]
-
-
-def light_positions(network: LaneletNetwork) -> dict[int, FloatArray]:
-    """Return the position (x, y) of each traffic light: its own, or the end of its lane."""
-    lights: list[TrafficLight] = network.traffic_lights
-    found = {}
-    for light in lights:
-        lanelet = next((item for item in network.lanelets
-                        if light.traffic_light_id in item.traffic_lights), None)
-        if light.position is not None:
-            found[light.traffic_light_id] = np.asarray(light.position, dtype=np.float64)[:2]
-        elif lanelet is not None:
-            found[light.traffic_light_id] = lanelet.right_vertices[-1, :2]
-    return found
 
 
 def _roads(network: LaneletNetwork) -> Iterator[Marker]:
