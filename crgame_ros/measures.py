@@ -12,6 +12,11 @@ def unit_symbol(unit: str) -> str:
     return '' if unit == '1' else unit.replace('^2', '²').replace('^3', '³')
 
 
+def with_unit(label: str, symbol: str) -> str:
+    """Return a label, text or HTML, with the unit behind it, if there is one."""
+    return f'{label} [{symbol}]' if symbol else label
+
+
 @dataclass(frozen=True)
 class Measure:
     """

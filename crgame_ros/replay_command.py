@@ -59,8 +59,8 @@ def replay(values: argparse.Namespace) -> int:
     """Replay against every planner, write the runs and print the comparison."""
     from crgame_ros.analysis.criticality.recorded import measure_log
     from crgame_ros.analysis.outcome_line import tell_outcome
-    from crgame_ros.analysis.scores.scored_run import scores_of
     from crgame_ros.planner.registry import planner_class
+    from crgame_ros.recording.progress import on_stderr
     from crgame_ros.recording.run_folder import recording_in
     from crgame_ros.recording.run_trajectories import read_trajectories
     _check(values)
@@ -78,10 +78,10 @@ def replay(values: argparse.Namespace) -> int:
     # A run's last line, to be told after the table.
     outcomes: list[Callable[[], int]] = []
     for alternative in runs:
-        scores = scores_of(alternative.record, {}, drives_only=True).vehicles
         assert alternative.outcome is not None
-        outcomes.append(partial(tell_outcome, _say, alternative.outcome,
-                                alternative.usual_criticality, f'{alternative.planner}: ', scores))
+        outcomes.append(partial(
+            tell_outcome, on_stderr, alternative.outcome, alternative.usual_criticality,
+            f'{alternative.planner}: ', alternative.drive_scores))
         found.append(alternative.as_dict())
         # Written after each, so that a failure loses none of the others.
         write_text(json.dumps(found, indent=2, allow_nan=False) + '\n',
@@ -113,6 +113,7 @@ def _offline(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories')
     from crgame_ros.launcher.arguments import RunRequest
     from crgame_ros.launcher.run_plan import effective_setup
     from crgame_ros.recording.export import write_scenario
+    from crgame_ros.recording.progress import on_stderr
     from crgame_ros.recording.run_points import recorded_states
     setups = {name: effective_setup(RunRequest(driver=f'replay:{bag}', planners=(name,)))
               for name in values.planner}
@@ -121,9 +122,9 @@ def _offline(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories')
 
     def runs() -> Iterator['Alternative']:
         for name, setup in setups.items():
-            _say(f'driving against {name} …')
+            on_stderr(f'driving against {name} …')
             alternative = drive_against(name, setup, recorded, values.latency, traces,
-                                        say=_say)
+                                        say=on_stderr)
             write_scenario(alternative.log, folder / f'{_file_name(name, setups)}.xml')
             yield alternative
 
@@ -151,10 +152,6 @@ def _live(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories') ->
             yield Alternative.of_live(name, run, recorded)
 
     return folder, runs()
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
 
 
 def _make_folder(out: Path | None, run: Path) -> Path:

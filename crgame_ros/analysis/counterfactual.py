@@ -31,7 +31,6 @@ class Alternative(Run):
     A run of a recorded human against a planner.
 
     :ivar planner: its name, as given by the user.
-    :ivar result: result of an offline run; None for a live one.
     """
 
     def __init__(self, planner: str, recorded: RunTrajectories, *, bag: Path | None = None,
@@ -43,7 +42,7 @@ class Alternative(Run):
         :param recorded: the run that was recorded.
         """
         super().__init__(planner, bag=bag, record=record, timing=timing, result=result)
-        self.planner, self.result, self._recorded = planner, result, recorded
+        self.planner, self._recorded = planner, recorded
 
     @classmethod
     def of_live(cls, planner: str, folder: Path, recorded: RunTrajectories) -> 'Alternative':
@@ -73,11 +72,6 @@ class Alternative(Run):
         Objects that react to the AV change the scene, and the human's inputs may no longer fit it.
         """
         return self._differs_s(self.log.object_poses, self._recorded.object_poses)
-
-    @property
-    def state_hash(self) -> str | None:
-        """Return the hash over all states of an offline run."""
-        return None if self.result is None else self.result.state_hash
 
     def as_dict(self) -> dict[str, object]:
         """Return the result as a JSON-compatible dictionary."""

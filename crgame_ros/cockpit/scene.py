@@ -19,7 +19,7 @@ from crgame_ros.game.task_spec import answer_key, TaskSpec
 from crgame_ros.geometry.curve import arc_length
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import first_of_junctions, RoadNetwork
-from crgame_ros.roads.signs import light_places, stop_line_ends
+from crgame_ros.roads.signs import lanelets_by, light_places, stop_line_ends
 from crgame_ros.roads.surface import lanelet_areas
 from crgame_ros.scenario.exact_values import group_outline
 from crgame_ros.scenario.light_and_air import environment_of
@@ -84,10 +84,7 @@ def light_entries(network: LaneletNetwork) -> list[Document]:
 
 def sign_entries(network: LaneletNetwork) -> list[Document]:
     """Describe the content and position of each sign and the heading of the traffic it faces."""
-    lanelets: dict[int, list[Lanelet]] = {}
-    for lanelet in network.lanelets:
-        for sign_id in lanelet.traffic_signs or ():
-            lanelets.setdefault(sign_id, []).append(lanelet)
+    lanelets = lanelets_by(network, lambda lanelet: lanelet.traffic_signs)
     return [entry for sign in network.traffic_signs if sign.position is not None
             for entry in _sign(sign, lanelets.get(sign.traffic_sign_id, []), network)]
 

@@ -104,7 +104,7 @@ class TrafficNode(Node):
         self._network = RoadNetwork(scenario.loaded.scenario.lanelet_network)
         self._obstacles = ScenarioObstacles(scenario.loaded)
         self._reader = WorldReader(scenario.objects, TrafficLights(scenario.loaded.scenario))
-        objects = [item for item in scenario.objects if not item.role.is_ego]
+        objects = scenario.others
         agents = [item for item in objects if item.role is Role.TRAFFIC]
         self._columns = [objects.index(item) for item in agents]
         self._adopted = [self._obstacles.ids.index(item.id) for item in agents

@@ -24,7 +24,7 @@ from crgame_ros.vehicle.state import REST, STATE_WIDTH
 import numpy as np
 from numpy.typing import NDArray
 
-with postponed(*UNUSED, 'scipy.spatial.kdtree'):
+with postponed(*UNUSED):
     from commonroad_clcs.config import CLCSParams
     from commonroad_rp import reactive_planner as package
     from commonroad_rp.state import ReactivePlannerState

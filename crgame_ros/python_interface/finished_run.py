@@ -4,7 +4,6 @@
 
 from abc import abstractmethod
 from collections.abc import Collection, Iterable, Mapping
-from functools import cached_property
 from pathlib import Path
 from typing import NoReturn, TYPE_CHECKING, TypeVar
 import warnings
@@ -42,11 +41,6 @@ class Run(MeasuredRun):
         """Return the violations as in `timing.json`; None if unknown."""
         return None if self.outcome is None else self.outcome['drivability']['list']
 
-    @property
-    def state_hash(self) -> str | None:
-        """Return the SHA-256 over all states of an offline run; None for a recording."""
-        return None
-
     def states_of(self, vehicle_id: str) -> NDArray[np.float64]:
         """
         Return the rear-axle states (K, 8) of a driven vehicle, columns as in `StateColumn`.
@@ -67,12 +61,6 @@ class Run(MeasuredRun):
     @abstractmethod
     def recorded_traces(self) -> Mapping[str, NDArray[np.float64]]:
         """Return the states (N, 8) of its vehicles at the simulation steps from 0 on."""
-
-    @cached_property
-    def drive_scores(self) -> 'tuple[VehicleScores, ...]':
-        """Score its drives without CommonRoad's tools; empty where they cannot be scored."""
-        from crgame_ros.analysis.scores.scored_run import scores_of
-        return scores_of(self.record, {}, drives_only=True).vehicles
 
     def criticality(self, thresholds: Thresholds = USUAL) -> 'dict[str, VehicleCriticality]':
         """

@@ -81,9 +81,10 @@ class OfflineRun(Run):
     :ivar wall_s: its wall time [s]
     """
 
+    result: OfflineResult
+
     def __init__(self, name: str, result: OfflineResult, wall_s: float) -> None:
         super().__init__(name, result=result)
-        self.result = result
         self.wall_s = wall_s
 
     @property

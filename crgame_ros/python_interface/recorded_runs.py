@@ -3,6 +3,7 @@
 """Recorded runs, with the interface of offline runs; replays, measures, reports and tables."""
 
 from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 import time
 from typing import Literal, TYPE_CHECKING
@@ -26,12 +27,14 @@ from crgame_ros.python_interface.offline_runs import OfflineRun
 from crgame_ros.recording.recorded_game import read_game_document
 from crgame_ros.recording.run_folder import recording_in, run_name
 from crgame_ros.recording.run_points import recorded_states
+from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from crgame_ros.analysis.criticality.criticality import Criticality
     from crgame_ros.simulation.offline import OfflineResult
 
 
@@ -99,6 +102,16 @@ class ReplayedRun(OfflineRun):
                  wall_s: float) -> None:
         super().__init__(name, result, wall_s)
         self.alternative = alternative
+
+    @cached_property
+    def record(self) -> RunRecord:
+        """Return the log, the drivers' commands and the events."""
+        return self.alternative.record
+
+    @cached_property
+    def usual_criticality(self) -> 'Criticality':
+        """Return how critical it was by the usual thresholds."""
+        return self.alternative.usual_criticality
 
     @property
     def human_differs_s(self) -> float | None:

@@ -4,7 +4,7 @@
 
 from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import accumulate
 import math
 from typing import NamedTuple
@@ -99,6 +99,16 @@ def lights_of(lanelet: Lanelet, roads: LaneletNetwork) -> list[TrafficLight]:
     return [light for light in found if light is not None]
 
 
+def lanelets_by(network: LaneletNetwork, ids: Callable[[Lanelet], Iterable[int] | None]
+                ) -> dict[int, list[Lanelet]]:
+    """Return the lanelets of each sign or light that they name, by its id."""
+    found = defaultdict[int, list[Lanelet]](list)
+    for lanelet in network.lanelets:
+        for number in ids(lanelet) or ():
+            found[number].append(lanelet)
+    return found
+
+
 class LightPlace(NamedTuple):
     """
     Where a traffic light is.
@@ -115,20 +125,17 @@ class LightPlace(NamedTuple):
 
 def light_places(network: LaneletNetwork) -> dict[int, LightPlace]:
     """Return by id where lights are: as they say, or at the end of their lane, in its middle."""
-    lanelets = defaultdict[int, list[Lanelet]](list)
-    for lanelet in network.lanelets:
-        for light_id in lanelet.traffic_lights or ():
-            lanelets[light_id].append(lanelet)
+    lanelets = lanelets_by(network, lambda lanelet: lanelet.traffic_lights)
     found = {}
     for light in network.traffic_lights:
-        own = lanelets[light.traffic_light_id]
+        own = lanelets.get(light.traffic_light_id)
         before, end = own[0].center_vertices[-2:, :2] if own else np.zeros((2, 2))
         position = end if light.position is None else light.position
         if own or light.position is not None:
             found[int(light.traffic_light_id)] = LightPlace(
                 float(position[0]), float(position[1]),
                 math.atan2(end[1] - before[1], end[0] - before[0]),
-                tuple(int(each.lanelet_id) for each in own))
+                tuple(int(each.lanelet_id) for each in own or ()))
     return found
 
 

@@ -10,13 +10,12 @@ import statistics
 from crgame_ros.game.task_documents import TaskEntry
 from crgame_ros.messages.status_values import Status, status_amount, status_truth
 from crgame_ros.study.quality import Excess
+from crgame_ros.timing.measures import in_seconds
 
 # Statuses come every second, and at each change; one that fails to come tells nothing [s].
 _LONGEST_S = 1.5
-# Values of table I: name, key of the status, factor.
-_TIMES = (('max_cumulative_error_s', 'max_cumulative_error_ms', 1e-3),
-          ('timeout_ratio', 'timeout_ratio', 1.0),
-          ('real_time_ratio_final', 'real_time_ratio_final', 1.0), ('resets', 'resets', 1.0))
+# Keys of statuses with values of table I.
+_TIMES = ('max_cumulative_error_ms', 'timeout_ratio', 'real_time_ratio_final', 'resets')
 
 
 class DriveWatch:
@@ -83,9 +82,10 @@ class DriveWatch:
 
     def add_timing(self, table: Mapping[str, object] | None) -> None:
         """Take table I as far as it is known: values by name, with `_ms` for milliseconds."""
-        for name, key, factor in _TIMES:
+        for key in _TIMES:
             value = None if table is None else table.get(key)
             if isinstance(value, float):
+                name, factor = in_seconds(key)
                 self._timing[name] = factor * value
 
     def values(self) -> dict[str, float]:

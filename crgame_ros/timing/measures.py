@@ -46,6 +46,11 @@ TIMING_MEASURES = {
         '1', 'Steps that were caught up', 'cycles more than a step late', is_count=True)}
 
 
+def in_seconds(key: str) -> tuple[str, float]:
+    """Return the name of a number in SI units, as in tables, and the factor to it."""
+    return (f'{key.removesuffix("_ms")}_s', 1e-3) if key.endswith('_ms') else (key, 1)
+
+
 def timing_values(report: Mapping[str, Any]) -> dict[str, float]:
     """Return the value of each measure in the content of `timing.json`."""
     values = {**report, **{f'real_time_ratio_{key}': ratio

@@ -37,7 +37,7 @@ from crgame_ros.geometry.reference_point import (
     shifted_velocities,
     zero_for_nan,
 )
-from crgame_ros.measures import FOOTPRINTS, Measure
+from crgame_ros.measures import FOOTPRINTS, Measure, with_unit
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import goal_lanelets
 from crgame_ros.simulation.observer import ObservedRun
@@ -77,7 +77,7 @@ class PairMeasure(Measure):
     @property
     def head(self) -> str:
         """Return the name of its most critical value, with the unit, as the head of a table."""
-        return f'{self.extreme} [{self.symbol}]'
+        return with_unit(self.extreme, self.symbol)
 
     def matters(self, value: float) -> bool:
         """Return whether a value is worth telling: longer times come from equal speeds."""

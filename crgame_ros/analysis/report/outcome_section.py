@@ -32,6 +32,7 @@ from crgame_ros.analysis.report.section import (
 from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.rules.vehicle_rules import RULE_MEASURES
 from crgame_ros.analysis.runs.run import Run
+from crgame_ros.measures import with_unit
 import numpy as np
 from numpy.typing import NDArray
 
@@ -79,7 +80,7 @@ def _violations(run: Run) -> str:
 
 def _rules(run: Run) -> str:
     html = table('Traffic rules', ('vehicle', *(
-        measure_word(each) + (f' [{each.symbol}]' if each.symbol else '')
+        with_unit(measure_word(each), each.symbol)
         for each in RULE_MEASURES.values())), [
             (named(run, vehicle.vehicle_id), *(
                 number(vehicle.values[name], 0 if each.is_count else 2)
@@ -126,7 +127,7 @@ def criticality_section(run: Run) -> Section:
             or f'<p>{caption}: no other was near.</p>'
     told = [each.told(limits) for each in EXPOSURES.values()]
     html += table('Over the whole run', ('vehicle', *(
-        f'{each.label} [{each.symbol}]' for each in told)), [
+        with_unit(each.label, each.symbol) for each in told)), [
             (named(run, vehicle.vehicle_id), *map(number, vehicle.exposures.values()))
             for vehicle in measured], 'numbers')
     html += filled_table('Following a leader: gaps bumper to bumper, headways front to front', (

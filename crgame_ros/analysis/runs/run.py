@@ -39,6 +39,7 @@ if TYPE_CHECKING:  # They take a second to import, and only measures need them.
     from crgame_ros.analysis.pictures.timing_figure import TimedRun
     from crgame_ros.analysis.rules.vehicle_rules import VehicleRules
     from crgame_ros.analysis.scores.scored_run import RunScores
+    from crgame_ros.analysis.scores.vehicle import VehicleScores
 
 FloatArray = NDArray[np.float64]
 # Called with a piece of work, as in `reading runs/NAME`, and the share done of it, 0 to 1.
@@ -68,6 +69,7 @@ class Run:
     :ivar name: for people.
     :ivar key: part of addresses in a report.
     :ivar bag: its recording; None for an offline run.
+    :ivar result: result of an offline run; None of a recorded one.
     :ivar scoring: which scores it gets.
     :ivar tallies: by AV, once its plans have been tabulated.
     """
@@ -84,7 +86,7 @@ class Run:
         """
         self.name, self.bag, self.key = name, bag, 'run1'
         self._epoch, self.scoring, self._progress = epoch, scoring, progress
-        self._known_timing, self._result = timing, result
+        self._known_timing, self.result = timing, result
         self.tallies: dict[str, PlanTally] = {}
         if record is not None:
             self.record, self.log = record, record.log
@@ -112,7 +114,7 @@ class Run:
 
         :raises InputError: if the recording lacks it.
         """
-        if self._result is not None:
+        if self.result is not None:
             return self.record.log
         assert self.bag is not None
         return read_trajectories(self.bag, self._epoch, self.telling('reading'))
@@ -120,8 +122,8 @@ class Run:
     @cached_property
     def record(self) -> RunRecord:
         """Return the log, the drivers' commands and the events."""
-        if self._result is not None:
-            return run_record_of(self._result)
+        if self.result is not None:
+            return run_record_of(self.result)
         assert self.bag is not None
         return record_of_log(self.bag, self.log)
 
@@ -193,7 +195,12 @@ class Run:
     @cached_property
     def outcome(self) -> RunReport | None:
         """Return planners, violations and contacts as in `timing.json`; None if unknown."""
-        return self.timing if self._result is None else offline_outcome(self._result)
+        return self.timing if self.result is None else offline_outcome(self.result)
+
+    @property
+    def state_hash(self) -> str | None:
+        """Return the SHA-256 over all states of an offline run; None for a recording."""
+        return None if self.result is None else self.result.state_hash
 
     @property
     def contacts(self) -> Sequence[ContactEntry] | None:
@@ -309,6 +316,12 @@ class Run:
             return RunScores()
         return scores_of(self.record, self.answers, drives_only=self.scoring == 'drives',
                          progress=self.telling('scoring'))
+
+    @cached_property
+    def drive_scores(self) -> 'tuple[VehicleScores, ...]':
+        """Score its drives without CommonRoad's tools; empty where they cannot be scored."""
+        from crgame_ros.analysis.scores.scored_run import scores_of
+        return scores_of(self.record, {}, drives_only=True).vehicles
 
     @cached_property
     def story(self) -> 'tuple[Moment, ...]':

@@ -20,7 +20,7 @@ from crgame_ros.analysis.tables.column import (
 )
 from crgame_ros.game.objects import Role
 from crgame_ros.measures import Measure
-from crgame_ros.timing.measures import TIMING_MEASURES, timing_values
+from crgame_ros.timing.measures import in_seconds, TIMING_MEASURES, timing_values
 
 UNTIMED = 'its timing was not recorded, as that of an offline run'
 UNTOLD = 'its cycles were not recorded'
@@ -28,11 +28,10 @@ UNTOLD = 'its cycles were not recorded'
 
 def _column(key: str, measure: Measure) -> tuple[Column, float]:
     """Return the column of a number of `timing.json`, and the factor to its unit."""
-    if measure.unit == 'ms':
-        name = key.removesuffix('_ms') + '_s'
-        return Column.of(name, replace(measure, unit='s'), UNTIMED), 1e-3
+    name, factor = in_seconds(key)
     # The run's duration has another column.
-    return Column.of('timed_duration_s' if key == 'duration_s' else key, measure, UNTIMED), 1.0
+    return Column.of('timed_duration_s' if key == 'duration_s' else name, replace(
+        measure, unit='s' if measure.unit == 'ms' else measure.unit), UNTIMED), factor
 
 
 _COLUMNS = {key: _column(key, measure) for key, measure in TIMING_MEASURES.items()}
@@ -61,9 +60,8 @@ def _identity(run: Run) -> Iterator[Row]:
 
 def _timing(run: Run) -> Iterator[Row]:
     found: dict[str, object] = {} if run.timing is None else {
-        column.name: value if column.type == INTEGER else factor * value
-        for value, (column, factor) in zip(
-            timing_values(run.timing).values(), _COLUMNS.values(), strict=True)}
+        _COLUMNS[key][0].name: _COLUMNS[key][1] * value
+        for key, value in timing_values(run.timing).items()}
     if run.outcome is not None:
         found['violations'] = run.outcome['drivability']['violations']
         found['contacts'] = None if run.contacts is None else len(run.contacts)

@@ -16,7 +16,7 @@ from crgame_ros.evaluation.summary.summary import (
     PairedDifferences,
     Summary,
 )
-from crgame_ros.measures import unit_symbol
+from crgame_ros.measures import unit_symbol, with_unit
 
 NOTHING = '-'
 _ALWAYS_TOLD = ('scenario', 'planner', 'seed')
@@ -110,7 +110,7 @@ def known_measures(summary: Summary) -> Iterator[tuple[int, SummaryMeasure]]:
 def measure_label(measure: SummaryMeasure) -> str:
     """Return the label of a measure with its unit."""
     unit = '%' if measure.is_share else unit_symbol(measure.unit)
-    return f'{measure.label} [{unit}]' if unit else measure.label
+    return with_unit(measure.label, unit)
 
 
 def quantity(value: float, measure: SummaryMeasure, signed: bool = False) -> str:

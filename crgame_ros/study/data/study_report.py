@@ -20,6 +20,7 @@ from crgame_ros.analysis.report.section import (
     table,
 )
 from crgame_ros.errors import InputError
+from crgame_ros.measures import with_unit
 from crgame_ros.study.analysis.mixed_model import fit_model, missing_extra, model_formulas
 from crgame_ros.study.analysis.planned_tests import (
     PairedTest,
@@ -158,8 +159,7 @@ def _timing(data: StudyData) -> str:
                 'not known is not judged.')
     return html + table('Timing of the trials that count', (
         '', 'trial', 'condition', *(
-            f'{check.words} [{check.unit}]' if check.unit else check.words
-            for check in _TIMES.values()), 'beyond'),
+            with_unit(check.words, check.unit) for check in _TIMES.values()), 'beyond'),
         list(_timed(data.trials)), 'numbers trials')
 
 

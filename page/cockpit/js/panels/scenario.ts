@@ -111,7 +111,6 @@ class ScenarioPanel {
     this.#start.disabled = true;
     this.#busy.describe('Reading the scenario …');
     const slow = setTimeout(() => this.#busy.describe(COMPILING), SLOW_MS);
-    abort.signal.addEventListener('abort', () => clearTimeout(slow));
     try {
       const preview = await fetchPreview(id, abort.signal);
       this.#show(preview);
@@ -121,8 +120,9 @@ class ScenarioPanel {
       }
       this.#card.hidden = true;
       setText(this.#errors.preview, errorText(error));
+    } finally {
+      clearTimeout(slow);
     }
-    clearTimeout(slow);
     this.#busy.end();
   }
 
